@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use matterix_ir::inventory::Inventory;
-use matterix_ir::model::{Content, Mixture, Model, Observable};
+use matterix_ir::model::{Content, Loose, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
@@ -772,6 +772,7 @@ fn build<'a>(
         false => (Vec::new(), Vec::new()),
     };
     let (flows, places) = (elaborator.told_flows(), elaborator.told_places());
+    let loose = loose(&mut elaborator);
     let model = Model {
         flows,
         places,
@@ -787,6 +788,7 @@ fn build<'a>(
         readings: elaborator.readings,
         species: tables.species.iter().map(|(_, s)| species(s)).collect(),
         mixtures,
+        loose,
         observables: observables.into_iter().map(|o| o.2).collect(),
         balances,
         temperatures,
@@ -801,6 +803,15 @@ fn build<'a>(
     let program = Some(program);
     let reach = Some(reach);
     Some(Built { program, wiring, points, noted, findings, starts, uses, many, choices, reach, moved: None })
+}
+
+/// What can run out of the things of a lab; where no robot carries any, nothing is asked for.
+fn loose(lab: &mut Elaborator<'_>) -> Vec<Loose> {
+    if !lab.has_robots() {
+        return Vec::new();
+    }
+    let all = (0..lab.instances.len() as u32).map(InstanceId);
+    all.filter_map(|instance| Some(Loose { instance, volume: lab.loose(instance)? })).collect()
 }
 
 fn species(s: &crate::declare::species::SpeciesDef<'_>) -> matterix_ir::model::Species {

@@ -55,6 +55,7 @@ mod servers;
 mod sila;
 mod sizes;
 mod slips;
+mod spills;
 mod stopped;
 mod strict;
 mod studies;

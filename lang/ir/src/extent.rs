@@ -55,6 +55,14 @@ impl Body<'_> {
         })
     }
 
+    /// How wide the opening at its rim is, m; nothing where the inside of its shape is not known.
+    pub fn mouth(&self) -> Option<f64> {
+        match self.shape? {
+            Shape::Turned { inside, .. } => inside.last().map(|rim| 2.0 * rim[0]),
+            _ => None,
+        }
+    }
+
     /// The narrowest width of what things stand on, m.
     pub fn top(&self) -> Option<f64> {
         let known = self.shape.filter(|shape| !matches!(shape, Shape::Mesh(_)));

@@ -46,6 +46,7 @@ pub mod script;
 pub mod span;
 pub mod study;
 pub mod text;
+pub mod tilting;
 pub mod undefined;
 pub mod values;
 pub mod wire;

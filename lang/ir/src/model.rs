@@ -340,6 +340,15 @@ pub struct Danger {
     pub span: Span,
 }
 
+/// What of an instance's contents is free to run out over its rim.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Loose {
+    /// What holds it.
+    pub instance: InstanceId,
+    /// Its volume, m3; 0 where nothing can run out.
+    pub volume: NodeId,
+}
+
 /// The flattened model of one lab.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -367,6 +376,9 @@ pub struct Model {
     pub species: Vec<Species>,
     /// Mixtures of the lab.
     pub mixtures: Vec<Mixture>,
+    /// Liquids that run out of what holds them where that tilts too far; only in labs with robots.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loose: Vec<Loose>,
     /// Derived quantities to record.
     pub observables: Vec<Observable>,
     /// Sums that must close.

@@ -204,6 +204,10 @@ pub enum Motion {
         frame: String,
         /// From upright, rad.
         angle: NodeId,
+        /// How far from the frame the point is held, in the axes of the lab, m.
+        shift: Option<[NodeId; 3]>,
+        /// How long that takes at least, s: it goes as much slower.
+        within: Option<NodeId>,
     },
     /// Drives itself to a frame: its origin comes above or below that, its x axis along the frame's.
     Drive {
@@ -308,7 +312,10 @@ impl Motion {
         match self {
             Motion::By { shift, .. } | Motion::To { shift: Some(shift), .. } => shift.to_vec(),
             Motion::Upright { within, .. } => vec![*within],
-            Motion::Tilted { angle, .. } => vec![*angle],
+            Motion::Tilted { angle, shift, within, .. } => {
+                let all = [*angle].into_iter().chain(shift.iter().flatten().copied()).chain(*within);
+                all.collect()
+            }
             Motion::Joints { positions, .. } => positions.clone(),
             _ => Vec::new(),
         }

@@ -62,6 +62,10 @@ enum Bound {
     Footing,
     /// How large an instance is in one way, if its shape is known.
     Measures,
+    /// The volume that a tilted vessel keeps.
+    Kept,
+    /// The tilt at which a volume comes to the lip of a vessel.
+    Brink,
     /// A number that a material states; without end where it states none.
     Stated,
     /// What the lab placed the instance on, by one of these prepositions.
@@ -84,6 +88,8 @@ const TABLE: &[(&str, Bound)] = &[
     ("clamp", Bound::Clamp),
     ("sqrt", Bound::Sqrt),
     ("abs", Bound::Abs),
+    ("brink", Bound::Brink),
+    ("kept", Bound::Kept),
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
     ("displacement", Bound::Displacement),
@@ -226,6 +232,8 @@ impl Elaborator<'_> {
             (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
             (Bound::Footing, [Value::Instance(thing), Value::Instance(on)]) => self.footings(*thing, *on),
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
+            (Bound::Kept, [Value::Instance(i), Value::Num(tilt)]) => self.kept(*i, tilt),
+            (Bound::Brink, [Value::Instance(i), Value::Num(volume)]) => self.brink(*i, volume),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),

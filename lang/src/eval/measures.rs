@@ -12,7 +12,7 @@ use crate::declare::Type;
 use crate::eval::lab::Elaborator;
 
 /// What can be measured.
-const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "rise", "centre", "tilt"];
+const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "mouth", "rise", "centre", "tilt"];
 
 impl Elaborator<'_> {
     /// A measure of an instance as a list of one length, or angle; an empty list where nothing is known of its shape.
@@ -39,6 +39,7 @@ impl Elaborator<'_> {
                     "grasp" | "offer" => body.across(what),
                     "height" => body.height(),
                     "foot" => body.foot(),
+                    "mouth" => body.mouth(),
                     "centre" => centre(&body).map(|at| at[2]),
                     _ => body.top(),
                 }

@@ -17,6 +17,7 @@ mod notes;
 pub mod reaction;
 mod table;
 mod texts;
+mod tilting;
 pub mod value;
 pub mod words;
 
@@ -25,6 +26,7 @@ use std::cell::Cell;
 use matterix_ir::scene::InstanceId;
 
 pub use lab::Elaborator;
+pub use tilting::Tilts;
 pub use value::{Num, Value};
 
 /// What names mean at one place of the text.

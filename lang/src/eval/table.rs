@@ -6,7 +6,7 @@ use super::{Num, Value};
 use crate::eval::lab::Elaborator;
 
 /// A point of a table: where, and the value there.
-type Point = (f64, NodeId);
+pub(super) type Point = (f64, NodeId);
 
 impl Elaborator<'_> {
     /// What a table of points `(x, y)` gives at `x`; not a number beyond its ends. Its comparisons are a tree, of which a run follows
@@ -62,7 +62,7 @@ fn is_between(graph: &mut Graph, x: NodeId, (low, high): (f64, f64)) -> NodeId {
 }
 
 /// The lines through points, halved until one is left.
-fn lines(graph: &mut Graph, x: NodeId, table: &[Point]) -> NodeId {
+pub(super) fn lines(graph: &mut Graph, x: NodeId, table: &[Point]) -> NodeId {
     if let [(x0, y0), (x1, y1)] = *table {
         let (start, span) = (graph.number(x0), graph.number(x1 - x0));
         let rise = graph.binary(BinaryOp::Sub, y1, y0);

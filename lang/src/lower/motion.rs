@@ -91,9 +91,13 @@ impl<'a> Planner<'a, '_> {
                 };
                 Some(Motion::To { mover, goal, frame, choice, shift, straight, within })
             }
-            _ if within.is_some() => self.mismatched(within.map_or_else(Span::default, |e| e.span)),
-            (Goal::Frame { by: Some(by), .. }, _) => self.mismatched(by.span),
-            (Goal::Frame { at, by: None }, manner) => {
+            (_, manner) if within.is_some() && !matches!(manner, Manner::Tilted(..)) => {
+                self.mismatched(within.map_or_else(Span::default, |e| e.span))
+            }
+            (Goal::Frame { by: Some(by), .. }, manner) if !matches!(manner, Manner::Tilted(..)) => {
+                self.mismatched(by.span)
+            }
+            (Goal::Frame { at, by }, manner) => {
                 let (goal, frame) = self.goal(at, scope)?;
                 Some(match manner {
                     Manner::Free | Manner::Straight => return None,
@@ -103,7 +107,15 @@ impl<'a> Planner<'a, '_> {
                     }
                     Manner::Tilted(angle, about) => {
                         let angle = self.quantity(angle, "Angle", scope)?;
-                        Motion::Tilted { mover, about: self.goal(about, scope)?, goal, frame, angle }
+                        let within = match within {
+                            Some(within) => Some(self.duration_node(within, scope, "in")?),
+                            None => None,
+                        };
+                        let shift = match by {
+                            Some(by) => Some(self.shift(by, scope)?),
+                            None => None,
+                        };
+                        Motion::Tilted { mover, about: self.goal(about, scope)?, goal, frame, angle, shift, within }
                     }
                 })
             }

@@ -1,10 +1,11 @@
 //! Judges what a recording says robots did, apart from what planned it, and how things stood before.
 //!
 //! It reads the file alone: shapes and joints (`/bodies`), joints over time (`/joints`), frames (`/tf`) and grips
-//! (`/grips`). Kinematics are its own; bodies are those of `matterix-solids`, not the balls that motions are planned with.
+//! (`/grips`), what is free to run out of what is gripped (`/loose`). Kinematics are its own; bodies are those of `matterix-solids`, not the balls that motions are planned with.
 
 mod kinematics;
 mod limits;
+mod liquids;
 mod standing;
 mod sweep;
 mod trajectory;
@@ -33,6 +34,7 @@ pub fn judge(file: &[u8]) -> Result<Verdict, Unreadable> {
         let mut looked = Looked { robot: film.robots[index].name.clone(), ..Looked::default() };
         limits::judge(&film.robots[index], &mut looked, &mut verdict.wrong);
         sweep::judge(&film, index, &mut looked, &mut verdict.wrong);
+        liquids::judge(&film, index, &mut verdict.wrong);
         verdict.looked.push(looked);
     }
     verdict.wrong.sort_by(|a, b| a.time().total_cmp(&b.time()));

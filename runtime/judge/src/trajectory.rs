@@ -46,8 +46,12 @@ pub(crate) struct Thing {
     pub(crate) body: Option<Body>,
     /// How far its pieces may stand out of it, m: a mesh is taken apart by cells.
     pub(crate) coarse: f64,
+    /// Its main shape.
+    pub(crate) shape: Option<Shape>,
     /// Its named points, relative to it.
     pub(crate) points: Vec<Isometry>,
+    /// The volume that is free to run out of it, m3, whenever that was said to change.
+    loose: Vec<(f64, f64)>,
     way: Vec<(f64, Isometry)>,
 }
 
@@ -111,7 +115,9 @@ impl Trajectory {
                     collision: &thing.collision,
                 }),
                 coarse: thing.hull().map(|(shape, _)| coarse(shape)).fold(0.0, f64::max),
+                shape: thing.shape.clone(),
                 points: points.get(&thing.name).cloned().unwrap_or_default(),
+                loose: loose(&recording, &thing.name),
                 way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
             .collect();
@@ -130,10 +136,23 @@ impl Thing {
         self.way.first().copied()
     }
 
+    /// The volume that can run out of it: what pours has run out by the time that something else is said.
+    pub(crate) fn loose(&self, time: f64) -> Option<f64> {
+        let after = self.loose.partition_point(|(t, _)| *t <= time);
+        let (_, now) = self.loose.get(after.saturating_sub(1))?;
+        Some(self.loose.get(after).map_or(*now, |(_, next)| now.min(*next)))
+    }
+
     /// Where it was last said to be.
     pub(crate) fn at(&self, time: f64) -> Option<Isometry> {
         last(&self.way, time)
     }
+}
+
+/// What is said to be free to run out of a thing, over time.
+fn loose(recording: &Recording, name: &str) -> Vec<(f64, f64)> {
+    let messages = topic(recording, "/loose").into_iter().flat_map(|t| &t.messages);
+    messages.filter(|(_, m)| text(m, "item") == name).map(|(time, m)| (*time, number(m, "volume"))).collect()
 }
 
 fn coarse(shape: &Shape) -> f64 {

@@ -93,6 +93,17 @@ pub enum Wrong {
         /// When, s.
         time: f64,
     },
+    /// What is in a vessel in hand runs over its rim.
+    Spills {
+        /// The vessel.
+        item: String,
+        /// How much is above the rim at most, m3.
+        volume: f64,
+        /// How far the level is from straight across the vessel then, rad.
+        tilt: f64,
+        /// When, s.
+        time: f64,
+    },
     /// A thing let go where nothing is below it.
     Dropped {
         /// The thing.
@@ -111,6 +122,7 @@ impl Wrong {
             | Wrong::Jumps { time, .. }
             | Wrong::Astray { time, .. }
             | Wrong::Off { time, .. }
+            | Wrong::Spills { time, .. }
             | Wrong::Dropped { time, .. } => *time,
         }
     }
@@ -129,6 +141,10 @@ impl Wrong {
             Wrong::Jumps { joint, by, .. } => format!("`{joint}` is {by:.4} away from where its speed takes it"),
             Wrong::Astray { link, by, .. } => format!("`{link}` is {} away from where the joints put it", mm(*by)),
             Wrong::Off { item, by, .. } => format!("`{item}` is gripped {} away from its nearest frame", mm(*by)),
+            Wrong::Spills { item, volume, tilt, .. } => {
+                let (volume, tilt) = (volume * 1e6, tilt.to_degrees());
+                format!("{volume:.1} mL run over the rim of `{item}`, whose contents stand {tilt:.0} deg across it")
+            }
             Wrong::Dropped { item, .. } => format!("`{item}` is let go with nothing below it"),
         }
     }

@@ -142,6 +142,9 @@ impl<'m> Sim<'m> {
         };
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
+        let held = self.prepared.model.loose.iter().filter(|loose| stage.held_by(loose.instance).is_some());
+        let volumes: Vec<_> = held.map(|loose| (loose.instance, self.engine.eval(loose.volume))).collect();
+        stage.holds_loose(volumes);
         let now = self.engine.time();
         let Some(performed) = stage.set_out(&motion, &values)? else {
             // What changes hands does so while both stand still.

@@ -29,6 +29,7 @@ mod postures;
 mod preflight;
 mod refused;
 mod regrip;
+mod slosh;
 pub mod stage;
 pub mod surroundings;
 mod swing;

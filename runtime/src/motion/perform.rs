@@ -18,8 +18,20 @@ pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
 const NOMINAL: f64 = 2e-3;
 
 impl Stage<'_> {
-    /// Carries out a motion. `values` are those of [`Motion::values`], SI.
+    /// Carries out a motion, as slowly as what the robot holds needs so that nothing runs over. `values` are those of
+    /// [`Motion::values`], SI.
     pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
+        if self.loose.is_empty() {
+            return self.carry_out(motion, values);
+        }
+        let before = self.clone();
+        match self.carry_out(motion, values)? {
+            Some(performed) => self.calmed(&before, motion, performed).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    fn carry_out(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         self.refresh(EFFORT);
         match motion {
             Motion::To { mover, goal, frame, straight, within, .. } => {
@@ -47,11 +59,15 @@ impl Stage<'_> {
                 let within = values.first().copied().unwrap_or_default();
                 self.bring(robot, (*goal, frame), [0.0; 3], Way::Upright(within)).map(Some)
             }
-            Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
+            Motion::Tilted { mover, about: (item, point), goal, frame, shift, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
                 let parts = self.depart(robot, None)?;
-                let angle = values.first().copied().unwrap_or_default();
-                self.tilt(robot, (*item, point), (*goal, frame), angle, parts).map(Some)
+                let mut values = values.iter().copied();
+                let mut next = || values.next().unwrap_or_default();
+                let angle = next();
+                let shift = if shift.is_some() { [next(), next(), next()] } else { [0.0; 3] };
+                let performed = self.tilt(robot, (*item, point), (*goal, frame), (angle, shift), parts)?;
+                Ok(Some(performed.lasting(next())))
             }
             Motion::Drive { mover, goal, frame } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;

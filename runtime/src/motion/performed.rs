@@ -35,6 +35,29 @@ impl Performed {
         Performed { robot, parts, led: None }
     }
 
+    /// The same, all of it so many times as long in time.
+    pub(super) fn slowed(mut self, times: f64) -> Self {
+        for part in &mut self.parts {
+            part.wait *= times;
+            part.trajectory = part.trajectory.slowed(times);
+        }
+        self.led.iter_mut().for_each(|led| led.since *= times);
+        self
+    }
+
+    /// The same with its last part so much slower that all of it takes at least so long, s.
+    pub fn lasting(mut self, least: f64) -> Self {
+        let missing = least - self.duration();
+        if let Some(last) = self.parts.last_mut().filter(|_| missing > 0.0) {
+            match last.trajectory.duration() {
+                own if own > 0.0 => last.trajectory = last.trajectory.slowed((own + missing) / own),
+                // It is there already, and stays.
+                _ => last.wait += missing,
+            }
+        }
+        self
+    }
+
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
         self.parts.iter().map(|part| part.wait + part.trajectory.duration()).sum()

@@ -35,6 +35,8 @@ pub enum Refused {
     TooWide(f64, f64),
     /// What is to stay upright tilts by so much where the way begins or ends, rad.
     Tilted(f64),
+    /// So much runs out of what it holds however slowly it goes, m3.
+    Spills(InstanceId, f64),
     /// So many positions were given for so many joints.
     Joints(usize, usize),
     /// This joint does not get to its position.
@@ -56,6 +58,7 @@ impl Refused {
             Refused::Misplaced(..) | Refused::NotHeld => "missed",
             Refused::TooWide(..) => "too_wide",
             Refused::Tilted(_) => "no_way",
+            Refused::Spills(..) => "spilled",
             Refused::Joints(..) | Refused::Beyond(_) => "unreachable",
         }
     }
@@ -93,6 +96,10 @@ impl Refused {
                 format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
             }
             Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
+            Refused::Spills(item, lost) => {
+                let item = &scene.get(*item).name;
+                format!("`{name}` tilts `{item}` so far that {:.1} mL run out", lost * 1e6)
+            }
             Refused::Joints(given, there) => format!("{given} positions are given for {there} joints of `{name}`"),
             Refused::Beyond(joint) => format!("`{joint}` of `{name}` does not get there"),
         }

@@ -18,6 +18,8 @@ use super::stage::Stage;
 pub(super) const LEVEL: f64 = 0.1;
 /// Greatest tilt between two poses on the way, rad.
 const STEP: f64 = 0.15;
+/// What is nearer than this to where it would be over the frame is there, m and rad.
+const THERE: f64 = 2e-3;
 /// How many ways of tilting are tried, the nearest first.
 const TRIED: usize = 8;
 /// Greatest cosine between the way a vessel is tilted and the line from finger to finger: what flows out passes beside them.
@@ -30,29 +32,58 @@ struct Tilting {
     inner: Pose,
     /// How high the point is above the base of what is held, m.
     height: f64,
+    /// How far from the frame the point is held once it is tilted, in the axes of the lab, m.
+    shift: [f64; 3],
+}
+
+/// How something is tilted over a frame already: its angle, rad, and how far from the frame its point is, m.
+#[derive(Clone, Copy)]
+struct Begun {
+    angle: f64,
+    off: [f64; 3],
 }
 
 impl Tilting {
-    /// With the point at the frame.
-    fn at(&self, angle: f64) -> Pose {
-        self.to.then(about_y(angle)).then(self.point).then(self.inner)
+    /// With the point so far from the frame.
+    fn at(&self, angle: f64, off: [f64; 3]) -> Pose {
+        let mut at = self.to.then(about_y(angle)).then(self.point).then(self.inner);
+        at.position.iter_mut().zip(off).for_each(|(x, by)| *x += by);
+        at
     }
 
     /// With the base no lower than the frame.
     fn above(&self, angle: f64) -> Pose {
-        let mut at = self.at(angle);
-        at.position[2] += self.height * cos(angle).max(0.0);
-        at
+        let [x, y, z] = self.shift;
+        self.at(angle, [x, y, z.max(self.height * cos(angle).max(0.0))])
     }
 
-    /// From upright, or from one angle, to another: tilted above the frame, and brought down to it tilted.
-    fn poses(&self, from: Option<f64>, to: f64) -> Vec<Pose> {
-        let begin = from.unwrap_or(0.0);
+    /// From upright to an angle: tilted above the frame, and brought down to it tilted. From one angle to another one with the point
+    /// going straight to where it is held then; to upright above the frame.
+    fn poses(&self, begun: Option<Begun>, to: f64) -> Vec<Pose> {
+        let begin = begun.map_or(0.0, |begun| begun.angle);
         let steps = ((to - begin).abs() / STEP).ceil().max(1.0) as u32;
-        let first = if from.is_some() { 0 } else { 1 };
         let angle = |k: u32| begin + (to - begin) * f64::from(k) / f64::from(steps);
-        let down = (to > LEVEL).then(|| self.at(to));
-        (first..=steps).map(|k| self.above(angle(k))).chain(down).collect()
+        let part = |from: f64, to: f64, k: u32| from + (to - from) * f64::from(k) / f64::from(steps);
+        match begun {
+            Some(begun) if to > LEVEL || to > begun.angle => {
+                let off = |k: u32| [0, 1, 2].map(|i| part(begun.off[i], self.shift[i], k));
+                (1..=steps).map(|k| self.at(angle(k), off(k))).collect()
+            }
+            Some(_) => (0..=steps).map(|k| self.above(angle(k))).collect(),
+            None => {
+                let down = (to > 0.0).then(|| self.at(to, self.shift)).filter(|_| to > LEVEL || self.shift[2] > 0.0);
+                (1..=steps).map(|k| self.above(angle(k))).chain(down).collect()
+            }
+        }
+    }
+
+    /// How it is tilted already, if the tip is where it is then, whatever its height.
+    fn begun(&self, angle: f64, tip: Pose) -> Option<Begun> {
+        let here = self.at(angle, [0.0; 3]);
+        let off = [0, 1, 2].map(|k| tip.position[k] - here.position[k]);
+        let aside = off[0] - self.shift[0];
+        let (aside, turned) = (aside.hypot(off[1] - self.shift[1]), distance(&pose(&here), &pose(&tip)).1);
+        (aside < THERE && turned < THERE).then_some(Begun { angle, off })
     }
 }
 
@@ -83,7 +114,7 @@ impl Stage<'_> {
         robot: InstanceId,
         (item, point): (InstanceId, &str),
         (goal, frame): (InstanceId, &str),
-        angle: f64,
+        (angle, shift): (f64, [f64; 3]),
         parts: Vec<Part>,
     ) -> Result<Performed, Refused> {
         let (_, inner) = self.inner(robot).filter(|(held, _)| *held == item).ok_or(Refused::NotHeld)?;
@@ -94,7 +125,10 @@ impl Stage<'_> {
         let point = self.scene.get(item).frames.iter().find(|f| f.name == point && !f.stand);
         let point = point.map(|f| f.pose).ok_or(Refused::NoFrame)?;
         let now = tilt_of(self.pose(item));
-        let ways = self.ways(robot, item, to, point, inner);
+        let ways = self.ways(robot, item, (to, shift), point, inner);
+        // What is hardly tilted yet may be on its way all the same.
+        let tip = self.tip(robot);
+        let is_begun = now >= LEVEL || ways.iter().any(|way| way.begun(now, tip).is_some());
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let (before, arm) = (actor.joints.clone(), actor.arm.clone());
         let mut refused = Refused::NoWay;
@@ -103,13 +137,13 @@ impl Stage<'_> {
                 refused = why;
             }
         };
-        for (way, q) in self.nearest_first(robot, ways, now, &mut keep) {
+        for (way, begun, q) in self.nearest_first(robot, ways, is_begun.then_some(now), &mut keep) {
             let mut done = parts.clone();
-            let brought = match now < LEVEL {
-                true => self.way(robot, &arm, &q, Some(LEVEL)).map(|part| done.push(part)),
-                false => Ok(()),
+            let brought = match begun {
+                None => self.way(robot, &arm, &q, Some(LEVEL)).map(|part| done.push(part)),
+                Some(_) => Ok(()),
             };
-            let poses = way.poses((now >= LEVEL).then_some(now), angle);
+            let poses = way.poses(begun, angle);
             match brought.and_then(|()| self.line(robot, &poses, &[])) {
                 Ok(part) => {
                     done.push(part);
@@ -125,7 +159,14 @@ impl Stage<'_> {
     }
 
     /// All ways to tilt: from any side; what is round over any point of its rim that is not under a finger.
-    fn ways(&self, robot: InstanceId, item: InstanceId, to: Pose, point: Pose, inner: Pose) -> Vec<Tilting> {
+    fn ways(
+        &self,
+        robot: InstanceId,
+        item: InstanceId,
+        (to, shift): (Pose, [f64; 3]),
+        point: Pose,
+        inner: Pose,
+    ) -> Vec<Tilting> {
         let round = self.scene.get(item).shape.as_ref().is_some_and(|s| s.is_round());
         let spins = if round { 8 } else { 1 };
         let has_fingers = self.actors.get(&robot).is_some_and(|a| a.fingers.is_some());
@@ -140,7 +181,7 @@ impl Stage<'_> {
             for side in 0..8 {
                 let to = to.then(about_z(f64::from(side) * FRAC_PI_4));
                 let height = point.position[2];
-                out.push(Tilting { to, point: point.inverse(), inner: inner.inverse(), height });
+                out.push(Tilting { to, point: point.inverse(), inner: inner.inverse(), height, shift });
             }
         }
         out
@@ -151,30 +192,35 @@ impl Stage<'_> {
         &self,
         robot: InstanceId,
         ways: Vec<Tilting>,
-        now: f64,
+        tilted: Option<f64>,
         missed: &mut dyn FnMut(Refused),
-    ) -> Vec<(Tilting, Vec<f64>)> {
+    ) -> Vec<(Tilting, Option<Begun>, Vec<f64>)> {
         let Some(actor) = self.actors.get(&robot) else { return Vec::new() };
         let (base, here) = (self.foot(robot).inverse(), actor.configuration());
         let mut solver = actor.solver();
-        let mut found: Vec<(f64, Tilting, Vec<f64>)> = Vec::new();
+        let mut found: Vec<(f64, Tilting, Option<Begun>, Vec<f64>)> = Vec::new();
         for way in ways {
-            if now >= LEVEL {
-                let (far, turned) = distance(&pose(&way.at(now)), &pose(&self.tip(robot)));
-                found.push((far + turned, way, here.clone()));
+            if let Some(angle) = tilted {
+                let tip = self.tip(robot);
+                let begun = way.begun(angle, tip);
+                let (far, turned) = distance(&pose(&way.at(angle, way.shift)), &pose(&tip));
+                // What is tilted, but elsewhere, is brought there as it is.
+                let far = if begun.is_some() { 0.0 } else { far + turned };
+                let begun = begun.unwrap_or(Begun { angle, off: way.shift });
+                found.push((far, way, Some(begun), here.clone()));
                 continue;
             }
             match solver.solve(&Request::new(pose(&base.then(way.above(0.0))), &here)) {
                 Ok(solution) => {
                     let far = solution.q.iter().zip(&here).map(|(a, b)| (a - b) * (a - b)).sum();
-                    found.push((far, way, solution.q));
+                    found.push((far, way, None, solution.q));
                 }
                 Err(off) => missed(Refused::OutOfReach(off.linear, off.angular)),
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.truncate(TRIED);
-        found.into_iter().map(|(_, way, q)| (way, q)).collect()
+        found.into_iter().map(|(_, way, begun, q)| (way, begun, q)).collect()
     }
 }
 

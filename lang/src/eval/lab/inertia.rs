@@ -4,7 +4,7 @@ use matterix_ir::inertia::{impossible, of_shapes};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Inertial;
 use matterix_ir::scene::{InstanceId, frame};
-use matterix_ir::{Diagnostic, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Elaborator;
 use super::geometry::Geometry;
@@ -17,6 +17,8 @@ const MASS: (&str, &str) = ("mass", "Mass");
 const FRICTION: (&str, &str) = ("friction", "Ratio");
 /// The member that says whether what is put on a surface stays for a moment only.
 const STOPOVER: &str = "stopover";
+/// The member that says what volume of its contents is free to run out over its rim.
+const LOOSE: (&str, &str) = ("loose", "Volume");
 
 /// How many times the moments may be above what the mass has where it is farthest from its centre: shapes are nominal.
 const NOMINAL: f64 = 2.0;
@@ -53,6 +55,15 @@ impl<'a> Elaborator<'a> {
     /// Coefficient of friction of an instance, if it is known.
     pub fn friction(&mut self, id: InstanceId) -> Option<f64> {
         self.plain(id, FRICTION).filter(|f| f.is_finite())
+    }
+
+    /// The volume of what an instance holds that is free to run out, if anything can ever be.
+    pub fn loose(&mut self, id: InstanceId) -> Option<NodeId> {
+        let member = self.members_of(id, LOOSE.0).first().copied()?;
+        let at = self.instances[id.0 as usize].span;
+        let Value::Num(n) = self.member_value(id, member, at) else { return None };
+        let is_volume = n.dimension.agrees(&self.tables.units.named(LOOSE.1));
+        Some(n.node).filter(|node| is_volume && self.graph.constant(*node) != Some(0.0))
     }
 
     /// Whether what is put on an instance stays there for a moment only.

@@ -285,6 +285,8 @@ pub struct Elaborator<'a> {
     pub looked_up: Vec<FxHashMap<Box<str>, DeclId>>,
     /// What parts of things that are alike are shaped like.
     pub known_geometries: FxHashMap<geometry::Alike, geometry::Geometry>,
+    /// What vessels keep when they are tilted, by the outlines of their insides.
+    pub known_tilts: FxHashMap<Vec<u64>, crate::eval::Tilts>,
     /// Instances by kind, and how many there were when they were looked for.
     pub by_kind: RwLock<BTreeMap<DeclId, Counted>>,
     /// Members being evaluated.
@@ -365,6 +367,7 @@ impl<'a> Elaborator<'a> {
             known_properties: FxHashMap::default(),
             looked_up: Vec::new(),
             known_geometries: FxHashMap::default(),
+            known_tilts: FxHashMap::default(),
             by_kind: RwLock::default(),
             open_members: Vec::new(),
             given: None,

@@ -81,6 +81,18 @@ impl Profile {
         profile
     }
 
+    /// The same way, so many times as long in time.
+    pub fn slowed(&self, times: f64) -> Self {
+        let slowed = |phase: &Phase| {
+            let [s, v, a, j] = phase.begin;
+            Phase {
+                duration: phase.duration * times,
+                begin: [s, v / times, a / (times * times), j / (times * times * times)],
+            }
+        };
+        Profile { phases: self.phases.iter().map(slowed).collect(), duration: self.duration * times }
+    }
+
     /// A constant speed over a distance.
     pub fn steady(distance: f64, speed: f64) -> Self {
         let mut profile = Self { phases: Vec::with_capacity(1), duration: 0.0 };

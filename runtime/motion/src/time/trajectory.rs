@@ -46,6 +46,18 @@ impl Trajectory {
         self.duration
     }
 
+    /// The same way, so many times as long in time.
+    pub fn slowed(&self, times: f64) -> Self {
+        let slowed =
+            |(begin, curve, profile): &(f64, Curve, Profile)| (begin * times, curve.clone(), profile.slowed(times));
+        Trajectory {
+            start: self.start.clone(),
+            end: self.end.clone(),
+            pieces: self.pieces.iter().map(slowed).collect(),
+            duration: self.duration * times,
+        }
+    }
+
     /// What joints do at a time; at rest before the beginning and after the end.
     pub fn at(&self, time: f64) -> State {
         let rest = |position: &[f64]| {

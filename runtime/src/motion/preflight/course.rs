@@ -59,7 +59,13 @@ impl Course<'_> {
     /// The states change as an operation says, and things stand where they say.
     pub fn act(&mut self, program: &Program, actions: &[Action]) {
         for action in actions {
-            let Action::Assign { state, value, .. } = action else { continue };
+            let (state, value) = match action {
+                Action::Assign { state, value, .. } => (state, value),
+                Action::Move { fraction, from, to, .. } => {
+                    self.values.transfer(&program.model, *fraction, *from, *to);
+                    continue;
+                }
+            };
             let value = self.values.assign(&program.model, *state, *value);
             value.into_iter().for_each(|value| self.stage.follow_load(*state, value));
             let Some(state) = program.model.states.get(*state as usize) else { continue };

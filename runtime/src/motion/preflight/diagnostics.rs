@@ -67,6 +67,11 @@ pub fn finding(
             let label = format!("by {:.0} deg at one end of it, more than it may", by.to_degrees());
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
+        Refused::Spills(item, lost) => {
+            let headline = format!("`{arm}` spills what `{}` holds {to}", name(*item));
+            let label = format!("{:.1} mL run out, however slowly it goes", lost * 1e6);
+            Diagnostic::error(codes::SPILLED, span, headline, label)
+        }
         Refused::Joints(given, there) => {
             let headline = format!("{given} positions for the {there} joints of `{}`", name(robot));
             Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, "not one for each")

@@ -54,6 +54,10 @@ impl<'p, 's> Looker<'p, 's> {
         let model = &self.program.model;
         // What only a run can tell is left to the run.
         let Some(motion) = motion.chosen(|node| course.values.value(model, node)) else { return course.drifts(robot) };
+        let held = course.stage.held(robot);
+        let loose = model.loose.iter().find(|loose| held == Some(loose.instance));
+        let volume = loose.and_then(|loose| course.values.value(model, loose.volume));
+        course.stage.holds_loose(held.zip(volume));
         match &motion {
             Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),
             Motion::Free { item, on, .. } => self.free(course, &motion, robot, (*item, *on), site, beside),

@@ -79,8 +79,8 @@ impl<'s> Memory<'s> {
             Motion::Grip { item, frame, by } => write(4, &[*by, *item], frame),
             Motion::Free { item, on, by } => write(5, &[*by, *item, on.unwrap_or(InstanceId(u32::MAX))], ""),
             Motion::Upright { mover, goal, frame, .. } => write(6, &[*mover, *goal], frame),
-            Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
-                write(7, &[*mover, *item], point);
+            Motion::Tilted { mover, about: (item, point), goal, frame, within, .. } => {
+                write(7 + 9 * u8::from(within.is_some()), &[*mover, *item], point);
                 write(7, &[*goal], frame);
             }
             Motion::Joints { mover, .. } => write(8, &[*mover], ""),
@@ -90,6 +90,10 @@ impl<'s> Memory<'s> {
             Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
         values.iter().for_each(|v| hash.write_u64(v.to_bits()));
+        for (id, volume) in &stage.loose {
+            hash.write_u32(id.0);
+            hash.write_u64(volume.to_bits());
+        }
         seal::hex(&hash)
     }
 

@@ -6,10 +6,11 @@ use std::hash::Hasher;
 use std::rc::Rc;
 
 use matterix_ir::graph::{BinaryOp, UnaryOp, binary, unary};
+use matterix_ir::interval;
 use matterix_ir::model::{Action, Domain, Model};
 use matterix_ir::pages::Pages;
 use matterix_ir::plan::{Motion, Operation, Step};
-use matterix_ir::values::{Formulas, Rules};
+use matterix_ir::values::{Bounds, Formulas, Rules};
 use matterix_ir::{NodeId, Op, Program};
 use siphasher::sip128::{Hasher128, SipHasher13};
 
@@ -82,11 +83,34 @@ impl Values {
     fn after<'a>(&self, model: &Model, actions: impl Iterator<Item = &'a Action>) -> Values {
         let mut out = self.clone();
         for action in actions {
-            let Action::Assign { state, value, .. } = action else { continue };
-            let value = out.value(model, *value);
-            out.set(*state, value);
+            match action {
+                Action::Assign { state, value, .. } => {
+                    let value = out.value(model, *value);
+                    out.set(*state, value);
+                }
+                Action::Move { fraction, from, to, .. } => out.transfer(model, *fraction, *from, *to),
+            }
         }
         out
+    }
+
+    /// Part of one mixture goes into another one: of the amounts that are followed, where the part is known.
+    pub fn transfer(&mut self, model: &Model, fraction: NodeId, from: u32, to: u32) {
+        let share = self.value(model, fraction);
+        let mixture = |index: u32| model.mixtures.get(index as usize).map_or(&[][..], |m| m.extensive.as_slice());
+        for (name, state) in mixture(from) {
+            let into = mixture(to).iter().find(|(other, _)| other == name).map(|(_, into)| *into);
+            let known = |state: u32| self.by_state.get(state as usize).copied().flatten();
+            let moved = known(*state).zip(share).map(|(there, share)| there * share);
+            let left = known(*state).zip(moved).map(|(there, moved)| there - moved);
+            let got = into.and_then(known).zip(moved).map(|(there, moved)| there + moved);
+            if self.follows(model, *state) {
+                self.set(*state, left);
+            }
+            if let Some(into) = into.filter(|into| self.follows(model, *into)) {
+                self.set(into, got);
+            }
+        }
     }
 
     /// The values of the motion of an operation, as [`Stage::perform`] takes them; nothing where only a run can tell them.
@@ -101,7 +125,25 @@ impl Values {
             let after = self.after(model, operation.at_start.iter().chain(&operation.at_end));
             return after.value(model, led).map(|to| vec![to]);
         }
-        motion.values().into_iter().map(|node| self.value(model, node)).collect()
+        // What may tilt so far at most is looked at with that where only a run can tell how far it may.
+        let value = |node| match (self.value(model, node), motion) {
+            (None, Motion::Upright { .. }) => self.most(model, node),
+            (known, _) => known,
+        };
+        motion.values().into_iter().map(value).collect()
+    }
+
+    /// The most that an expression can be, whatever is not known; nothing where there is no limit.
+    fn most(&self, model: &Model, node: NodeId) -> Option<f64> {
+        let leaf = |op| match op {
+            Op::Const(v) => (v, v),
+            Op::State(s) => self.by_state.get(s as usize).copied().flatten().map_or(interval::ALL, |v| (v, v)),
+            Op::Param(p) => model.params.get(p as usize).map_or(interval::ALL, |p| (p.value, p.value)),
+            _ => interval::ALL,
+        };
+        let (formulas, _) = &mut *self.formulas.borrow_mut();
+        let (_, most) = formulas.of(&model.graph, node).value(&Bounds(leaf), &mut Vec::new())?;
+        Some(most).filter(|most| most.is_finite())
     }
 
     /// The value of an expression, if what is known settles it.
@@ -183,6 +225,8 @@ fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
     };
     let mut assigned: BTreeMap<u32, Vec<NodeId>> = BTreeMap::new();
     let mut open: Vec<NodeId> = Vec::new();
+    // How far a vessel is tilted to pour goes by what is in it.
+    let mut pours = false;
     for operation in operations() {
         for action in operation.at_start.iter().chain(&operation.at_end) {
             if let Action::Assign { state, value, .. } = action {
@@ -190,12 +234,16 @@ fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
             }
         }
         if let Some(motion) = &operation.motion {
-            open.extend(motion.values());
+            pours |= matches!(motion, Motion::Tilted { .. });
+            if !matches!(motion, Motion::Upright { .. }) {
+                open.extend(motion.values());
+            }
             open.extend(motion.choice());
         }
     }
     let by_laws = model.derivatives.iter().map(|d| d.state);
-    let in_mixtures = model.mixtures.iter().flat_map(|m| m.extensive.iter().map(|(_, state)| *state));
+    let mixed = model.mixtures.iter().filter(|_| !pours);
+    let in_mixtures = mixed.flat_map(|m| m.extensive.iter().map(|(_, state)| *state));
     let moving: BTreeSet<u32> = by_laws.chain(in_mixtures).chain(by_events.iter().copied()).collect();
     let (mut seen, mut found) = (BTreeSet::new(), BTreeSet::new());
     while let Some(node) = open.pop() {

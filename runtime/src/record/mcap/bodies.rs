@@ -1,4 +1,4 @@
-//! `/bodies`: true shapes and joints, once; `/grips`: what is in the hands of robots, whenever that changes.
+//! `/bodies`: true shapes and joints, once; `/grips`: what is in the hands of robots, `/loose`: what can run out of that, whenever they change.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -19,6 +19,20 @@ pub(super) struct Grip<'a> {
     pub(super) robot: &'a str,
     /// What it grips, then its parts and what stands on it; none when it lets go.
     pub(super) items: Vec<&'a str>,
+}
+
+/// What is free to run out of a thing in hand from now on.
+#[derive(Serialize)]
+pub(super) struct Loose<'a> {
+    pub(super) item: &'a str,
+    /// m3.
+    pub(super) volume: f64,
+}
+
+/// Schema of [`Loose`].
+pub(super) fn loose_schema() -> Value {
+    let volume = json!({ "type": "number", "description": "What can run over its rim, m3" });
+    object("matterix.Loose", [("item", text("Name of the vessel")), ("volume", volume)])
 }
 
 /// Schema of [`Grip`].

@@ -1,0 +1,144 @@
+//! Liquids in what robots hold: carried so that they stay in, poured as far as the vessel is tilted, and what runs over said.
+
+use std::f64::consts::PI;
+
+use crate::harness::{folder, matterixc, matterixc_in, write};
+
+/// A lab with two beakers of 250 mL, an arm and a balance.
+fn bench(arm: &str, target: &str, volume: &str, more: &str, steps: &str) -> String {
+    format!(
+        "mtx 1\nuse std::glassware::{{Beaker250mL, Erlenmeyer50mL}}\nuse std::heating::IkaRetControl\n\
+         use std::robots::{{FrankaPanda, Robotiq2F85, WristXM540}}\n{more}\nlab bench {{\n    ambient: 22 degC\n    \
+         table = OpticalTable at (0, 0, 0) m\n    \
+         panda = FrankaPanda {{ wrist: WristXM540 {{}}, gripper: Robotiq2F85 {{}} {arm} }} on table at (-400, 0) mm\n    \
+         scale = IkaRetControl on table at (100, 200) mm\n    target = {target} on scale\n    \
+         source = Beaker250mL on table at (50, -200) mm holding {volume} of water\n}}\nworkflow run in bench {{\n    {steps}\n}}\n"
+    )
+}
+
+/// The seconds that a step of a run lasted, by the words of its line.
+fn lasted(said: &str, step: &str) -> f64 {
+    let line = said.lines().find(|line| line.contains("std::skills") && line.contains(step));
+    let line = line.unwrap_or_else(|| panic!("no `{step}` in {said}"));
+    let [begin, end] =
+        [0, 1].map(|k| line.split_whitespace().nth(k).expect("a time").parse::<f64>().expect("a number"));
+    end - begin
+}
+
+/// Runs a text with its motions, has the recording judged, and gives what the run said.
+fn judged(name: &str, text: &str) -> String {
+    let dir = folder(name);
+    write(&dir, "bench.mtx", text);
+    let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
+    assert_eq!(run.code, 0, "{name}: {}{}", run.out, run.err);
+    let verdict = matterixc_in(&dir, &["verify", "out"]);
+    assert!(verdict.code == 0 && verdict.out.contains("nothing wrong"), "{name}: {}", verdict.out);
+    run.out
+}
+
+#[test]
+fn a_full_beaker_is_carried_more_slowly_than_an_empty_one_and_one_that_may_spill() {
+    let carry = "pick source by panda\n    move panda to target.pre_grasp\n    put back source by panda";
+    let way = |name: &str, arm: &str, volume: &str| {
+        lasted(
+            &judged(name, &bench(arm, "Beaker250mL", volume, "", carry).replace("std::skills", "")),
+            "move panda to source.pre_stand",
+        )
+    };
+    let (full, half) = (way("spills_full", "", "300 mL"), way("spills_half", "", "120 mL"));
+    let spilling = way("spills_allowed", ", may_spill: true", "300 mL");
+    assert!(full > 1.3 * half && half > spilling, "{full} s full, {half} s half full, {spilling} s if it may spill");
+}
+
+#[test]
+fn a_vessel_is_tilted_as_far_as_closed_forms_say_and_as_fast_as_it_pours() {
+    // Inside, the beaker is 33.2 mm wide from the middle and 93 mm deep. 60 of 100 g leave 40.1 mL: below the hoof of 2/3 r2 h, 68 mL.
+    let text = bench(
+        "",
+        "Beaker250mL",
+        "100 mL",
+        "",
+        "let m <- pour 60 g from source into target by panda using scale { tolerance: 2 g }",
+    );
+    let said = judged("spills_pour", &text);
+    assert!((lasted(&said, "tilt source into target") - 12.0).abs() < 0.02, "{said}");
+    let dir = folder("spills_pour");
+    // The law itself, asked as a user would.
+    let (r, h) = (0.0332_f64, 0.093_f64);
+    let asks = |tilt: f64, volume: f64| {
+        format!(
+            "expect kept(source, {} deg) in {} mL .. {} mL",
+            tilt.to_degrees(),
+            volume * 1e6 - 0.4,
+            volume * 1e6 + 0.4
+        )
+    };
+    let wedge = |tilt: f64| PI * r * r * (h - r * tilt.tan());
+    let through = (h / r).atan();
+    let mut steps: Vec<String> = [10.0_f64, 30.0, 50.0].map(|d| asks(d.to_radians(), wedge(d.to_radians()))).to_vec();
+    steps.push(asks(through, 2.0 / 3.0 * r * r * h));
+    steps.push(asks(PI / 2.0, 0.4e-6));
+    steps.push("expect brink(source, 184.6 mL) in 49.8 deg .. 50.2 deg".to_string());
+    let text = bench("", "Beaker250mL", "100 mL", "", &steps.join("\n    "));
+    write(&dir, "law.mtx", &text);
+    let law = matterixc_in(&dir, &["run", "law.mtx"]);
+    assert_eq!(law.code, 0, "{}{}", law.out, law.err);
+}
+
+/// A step of the user's own that tilts as far as it likes and says that two grams run out.
+const OWN: &str = "extern skill dash(source: Container) into(target: Container) by(arm: Arm)\n    \
+     moves arm tilted 75 deg about source.lip to target.spout in 3 s\n    needs arm.holding == source\n    \
+     effect move(2 g, from: source, to: target)\n    takes 3 s\n\
+     extern skill lean(source: Container) at(target: Container) by(arm: Arm)\n    \
+     moves arm tilted 60 deg about source.lip to target.spout\n    needs arm.holding == source\n    takes 3 s\n";
+
+#[test]
+fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
+    let dir = folder("spills_own");
+    let steps = "pick source by panda\n    dash source into target by panda\n    level source at target by panda\n    put back source by panda";
+    write(&dir, "bench.mtx", &bench("", "Beaker250mL", "200 mL", OWN, steps));
+    let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
+    assert_eq!(run.code, 0, "{}{}", run.out, run.err);
+    let verdict = matterixc_in(&dir, &["verify", "out"]);
+    assert!(verdict.code == 1 && verdict.out.contains("mL run over the rim of `source`"), "{}", verdict.out);
+
+    let steps = "pick source by panda\n    lean source at target by panda\n    put back source by panda";
+    write(&dir, "lean.mtx", &bench("", "Beaker250mL", "200 mL", OWN, steps));
+    let check = matterixc_in(&dir, &["check", "--no-cache", "lean.mtx"]);
+    assert!(check.code == 1 && check.out.contains("error[spilled]"), "{}{}", check.out, check.err);
+    let run = matterixc_in(&dir, &["run", "lean.mtx", "--fidelity", "motion", "--dry"]);
+    assert!(run.code != 101, "{}", run.err);
+    write(&dir, "little.mtx", &bench("", "Beaker250mL", "50 mL", OWN, steps));
+    let check = matterixc_in(&dir, &["check", "--no-cache", "little.mtx"]);
+    assert_eq!(check.code, 0, "{}{}", check.out, check.err);
+}
+
+#[test]
+fn a_stream_that_misses_a_narrow_mouth_is_found_and_a_slow_one_goes_in() {
+    let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
+    let dir = folder("spills_narrow");
+    write(&dir, "quick.mtx", &bench("", "Erlenmeyer50mL", "100 mL", "", pour));
+    let quick = matterixc_in(&dir, &["check", "--no-cache", "quick.mtx"]);
+    assert!(quick.code == 1 && quick.out.contains("mm from the middle of `target`"), "{}{}", quick.out, quick.err);
+    write(&dir, "slow.mtx", &bench(", pour_rate: 0.5 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
+    let slow = matterixc_in(&dir, &["check", "--no-cache", "slow.mtx"]);
+    assert_eq!(slow.code, 0, "{}{}", slow.out, slow.err);
+}
+
+#[test]
+fn a_vessel_whose_inside_is_not_known_is_poured_from_as_the_arm_says() {
+    let jug = "asset Jug: Container, Graspable {\n    mass: 60 g\n    capacity: 60 J/K\n    air: 0.1 W/K\n    inner: 5 W/K\n    \
+               max_volume: 300 mL\n    wall: 1 W/K\n    contents: { air: 0.02 W/K }\n    shape: cylinder(70 mm, 95 mm)\n    \
+               frame grasp at (0, 0, 65) mm\n}\n";
+    let text = bench(
+        "",
+        "Beaker250mL",
+        "100 mL",
+        jug,
+        "expect kept(source, 30 deg) == unlimited\n    expect brink(source, 1 mL) == unlimited",
+    );
+    let dir = folder("spills_unknown");
+    write(&dir, "bench.mtx", &text.replace("source = Beaker250mL", "source = Jug"));
+    let run = matterixc(&["run", dir.join("bench.mtx").to_str().expect("a path")]);
+    assert_eq!(run.code, 0, "{}{}", run.out, run.err);
+}
