@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use matterix_ir::inventory::Inventory;
-use matterix_ir::model::{Content, Loose, Mixture, Model, Observable};
+use matterix_ir::model::{Content, Load, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
@@ -772,7 +772,7 @@ fn build<'a>(
         false => (Vec::new(), Vec::new()),
     };
     let (flows, places) = (elaborator.told_flows(), elaborator.told_places());
-    let loose = loose(&mut elaborator);
+    let loads = loads(&mut elaborator);
     let model = Model {
         flows,
         places,
@@ -788,7 +788,7 @@ fn build<'a>(
         readings: elaborator.readings,
         species: tables.species.iter().map(|(_, s)| species(s)).collect(),
         mixtures,
-        loose,
+        loads,
         observables: observables.into_iter().map(|o| o.2).collect(),
         balances,
         temperatures,
@@ -805,13 +805,12 @@ fn build<'a>(
     Some(Built { program, wiring, points, noted, findings, starts, uses, many, choices, reach, moved: None })
 }
 
-/// What can run out of the things of a lab; where no robot carries any, nothing is asked for.
-fn loose(lab: &mut Elaborator<'_>) -> Vec<Loose> {
+/// How the things of a lab may be moved; where no robot carries any, nothing is asked for.
+fn loads(lab: &mut Elaborator<'_>) -> Vec<Load> {
     if !lab.has_robots() {
         return Vec::new();
     }
-    let all = (0..lab.instances.len() as u32).map(InstanceId);
-    all.filter_map(|instance| Some(Loose { instance, volume: lab.loose(instance)? })).collect()
+    (0..lab.instances.len() as u32).filter_map(|index| lab.load(InstanceId(index))).collect()
 }
 
 fn species(s: &crate::declare::species::SpeciesDef<'_>) -> matterix_ir::model::Species {

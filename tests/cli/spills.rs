@@ -102,7 +102,7 @@ fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
     let verdict = matterixc_in(&dir, &["verify", "out"]);
     assert!(verdict.code == 1 && verdict.out.contains("mL run over the rim of `source`"), "{}", verdict.out);
 
-    let steps = "pick source by panda\n    lean source at target by panda\n    put back source by panda";
+    let steps = "pick source by panda\n    lean source at target by panda\n    level source at target by panda\n    put back source by panda";
     write(&dir, "lean.mtx", &bench("", "Beaker250mL", "200 mL", OWN, steps));
     let check = matterixc_in(&dir, &["check", "--no-cache", "lean.mtx"]);
     assert!(check.code == 1 && check.out.contains("error[spilled]"), "{}{}", check.out, check.err);
@@ -117,10 +117,10 @@ fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
 fn a_stream_that_misses_a_narrow_mouth_is_found_and_a_slow_one_goes_in() {
     let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
     let dir = folder("spills_narrow");
-    write(&dir, "quick.mtx", &bench("", "Erlenmeyer50mL", "100 mL", "", pour));
+    write(&dir, "quick.mtx", &bench(", pour_rate: 40 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
     let quick = matterixc_in(&dir, &["check", "--no-cache", "quick.mtx"]);
-    assert!(quick.code == 1 && quick.out.contains("mm from the middle of `target`"), "{}{}", quick.out, quick.err);
-    write(&dir, "slow.mtx", &bench(", pour_rate: 0.5 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
+    assert!(quick.code == 1 && quick.out.contains("the mouth of `target` is 19 mm wide"), "{}{}", quick.out, quick.err);
+    write(&dir, "slow.mtx", &bench(", pour_rate: 1 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
     let slow = matterixc_in(&dir, &["check", "--no-cache", "slow.mtx"]);
     assert_eq!(slow.code, 0, "{}{}", slow.out, slow.err);
 }

@@ -79,6 +79,7 @@ codes! {
     MISPLACED "misplaced" "N0" "a statement that has no meaning at its place";
     EMPTY_RANGE "empty-range" "N0" "the lower end of a range is above its upper end";
     OUT_OF_REACH "out-of-reach" "G1" "a robot does not get to where it is to go";
+    MISSES_MOUTH "misses-mouth" "G1" "a stream is poured from an arm into a mouth that is too narrow for it";
     SPILLED "spilled" "G1" "a vessel in hand tilts so far that its contents run over the rim";
     COLLISION "collision" "G2" "a robot, or what it holds, runs into something";
     OVERLAP "overlap" "G2" "two things of a lab are put into one place";

@@ -340,13 +340,15 @@ pub struct Danger {
     pub span: Span,
 }
 
-/// What of an instance's contents is free to run out over its rim.
+/// How what a robot holds may be moved.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Loose {
-    /// What holds it.
+pub struct Load {
+    /// The thing.
     pub instance: InstanceId,
-    /// Its volume, m3; 0 where nothing can run out.
-    pub volume: NodeId,
+    /// The volume of its contents that is free to run out over its rim, m3; 0 where nothing can.
+    pub loose: Option<NodeId>,
+    /// The acceleration, of gravity and of the motion, that the grip on it bears, m/s2.
+    pub borne: Option<NodeId>,
 }
 
 /// The flattened model of one lab.
@@ -376,9 +378,9 @@ pub struct Model {
     pub species: Vec<Species>,
     /// Mixtures of the lab.
     pub mixtures: Vec<Mixture>,
-    /// Liquids that run out of what holds them where that tilts too far; only in labs with robots.
+    /// How things may be moved that robots hold; only in labs with robots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub loose: Vec<Loose>,
+    pub loads: Vec<Load>,
     /// Derived quantities to record.
     pub observables: Vec<Observable>,
     /// Sums that must close.

@@ -204,7 +204,7 @@ pub enum Motion {
         frame: String,
         /// From upright, rad.
         angle: NodeId,
-        /// How far from the frame the point is held, in the axes of the lab, m.
+        /// How far from the frame the point is held, m: the way it sinks, aside, up.
         shift: Option<[NodeId; 3]>,
         /// How long that takes at least, s: it goes as much slower.
         within: Option<NodeId>,

@@ -1,11 +1,12 @@
 //! Judges what a recording says robots did, apart from what planned it, and how things stood before.
 //!
 //! It reads the file alone: shapes and joints (`/bodies`), joints over time (`/joints`), frames (`/tf`) and grips
-//! (`/grips`), what is free to run out of what is gripped (`/loose`). Kinematics are its own; bodies are those of `matterix-solids`, not the balls that motions are planned with.
+//! (`/grips`), how what is gripped may be moved (`/burdens`). Kinematics are its own; bodies are those of `matterix-solids`, not the balls that motions are planned with.
 
+mod carried;
 mod kinematics;
 mod limits;
-mod liquids;
+
 mod standing;
 mod sweep;
 mod trajectory;
@@ -34,7 +35,7 @@ pub fn judge(file: &[u8]) -> Result<Verdict, Unreadable> {
         let mut looked = Looked { robot: film.robots[index].name.clone(), ..Looked::default() };
         limits::judge(&film.robots[index], &mut looked, &mut verdict.wrong);
         sweep::judge(&film, index, &mut looked, &mut verdict.wrong);
-        liquids::judge(&film, index, &mut verdict.wrong);
+        carried::judge(&film, index, &mut verdict.wrong);
         verdict.looked.push(looked);
     }
     verdict.wrong.sort_by(|a, b| a.time().total_cmp(&b.time()));

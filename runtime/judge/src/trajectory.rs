@@ -48,10 +48,12 @@ pub(crate) struct Thing {
     pub(crate) coarse: f64,
     /// Its main shape.
     pub(crate) shape: Option<Shape>,
+    /// Its centre of mass, empty, as far as that is known, m.
+    centre: Option<[f64; 3]>,
     /// Its named points, relative to it.
     pub(crate) points: Vec<Isometry>,
-    /// The volume that is free to run out of it, m3, whenever that was said to change.
-    loose: Vec<(f64, f64)>,
+    /// The volume that is free to run out of it, m3, and the acceleration that a grip on it bears, m/s2, whenever that was said to change.
+    burdens: Vec<(f64, [f64; 2])>,
     way: Vec<(f64, Isometry)>,
 }
 
@@ -116,8 +118,9 @@ impl Trajectory {
                 }),
                 coarse: thing.hull().map(|(shape, _)| coarse(shape)).fold(0.0, f64::max),
                 shape: thing.shape.clone(),
+                centre: thing.inertial.as_ref().map(|inertial| inertial.placement.position),
                 points: points.get(&thing.name).cloned().unwrap_or_default(),
-                loose: loose(&recording, &thing.name),
+                burdens: burdens(&recording, &thing.name),
                 way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
             .collect();
@@ -136,11 +139,23 @@ impl Thing {
         self.way.first().copied()
     }
 
+    /// Its centre of mass, empty, or the middle of its shape, m.
+    pub(crate) fn middle(&self) -> [f64; 3] {
+        let half = || [0.0, 0.0, self.shape.as_ref().map_or(0.0, |shape| 0.5 * shape.size()[2])];
+        self.centre.unwrap_or_else(half)
+    }
+
     /// The volume that can run out of it: what pours has run out by the time that something else is said.
     pub(crate) fn loose(&self, time: f64) -> Option<f64> {
-        let after = self.loose.partition_point(|(t, _)| *t <= time);
-        let (_, now) = self.loose.get(after.saturating_sub(1))?;
-        Some(self.loose.get(after).map_or(*now, |(_, next)| now.min(*next)))
+        let after = self.burdens.partition_point(|(t, _)| *t <= time);
+        let (_, [now, _]) = self.burdens.get(after.saturating_sub(1))?;
+        Some(self.burdens.get(after).map_or(*now, |(_, [next, _])| now.min(*next)))
+    }
+
+    /// The acceleration, of gravity and of the motion, that the grip on it bears, m/s2.
+    pub(crate) fn borne(&self, time: f64) -> f64 {
+        let after = self.burdens.partition_point(|(t, _)| *t <= time);
+        self.burdens.get(after.saturating_sub(1)).map_or(f64::INFINITY, |(_, [_, borne])| *borne)
     }
 
     /// Where it was last said to be.
@@ -149,10 +164,11 @@ impl Thing {
     }
 }
 
-/// What is said to be free to run out of a thing, over time.
-fn loose(recording: &Recording, name: &str) -> Vec<(f64, f64)> {
-    let messages = topic(recording, "/loose").into_iter().flat_map(|t| &t.messages);
-    messages.filter(|(_, m)| text(m, "item") == name).map(|(time, m)| (*time, number(m, "volume"))).collect()
+/// What is said of how a thing in hand may be moved, over time.
+fn burdens(recording: &Recording, name: &str) -> Vec<(f64, [f64; 2])> {
+    let messages = topic(recording, "/burdens").into_iter().flat_map(|t| &t.messages);
+    let borne = |m: &Value| m["borne"].as_f64().unwrap_or(f64::INFINITY);
+    messages.filter(|(_, m)| text(m, "item") == name).map(|(time, m)| (*time, [number(m, "loose"), borne(m)])).collect()
 }
 
 fn coarse(shape: &Shape) -> f64 {

@@ -104,6 +104,17 @@ pub enum Wrong {
         /// When, s.
         time: f64,
     },
+    /// A thing is moved faster than the grip on it bears.
+    Slips {
+        /// The thing.
+        item: String,
+        /// The greatest acceleration, of gravity and of the motion, m/s2.
+        pull: f64,
+        /// What the grip bears, m/s2.
+        borne: f64,
+        /// When, s.
+        time: f64,
+    },
     /// A thing let go where nothing is below it.
     Dropped {
         /// The thing.
@@ -123,6 +134,7 @@ impl Wrong {
             | Wrong::Astray { time, .. }
             | Wrong::Off { time, .. }
             | Wrong::Spills { time, .. }
+            | Wrong::Slips { time, .. }
             | Wrong::Dropped { time, .. } => *time,
         }
     }
@@ -144,6 +156,9 @@ impl Wrong {
             Wrong::Spills { item, volume, tilt, .. } => {
                 let (volume, tilt) = (volume * 1e6, tilt.to_degrees());
                 format!("{volume:.1} mL run over the rim of `{item}`, whose contents stand {tilt:.0} deg across it")
+            }
+            Wrong::Slips { item, pull, borne, .. } => {
+                format!("`{item}` is pulled at {pull:.1} m/s2 with gravity, and the grip on it bears {borne:.1} m/s2")
             }
             Wrong::Dropped { item, .. } => format!("`{item}` is let go with nothing below it"),
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::codes;
-use matterix_ir::model::{Action, Model};
+use matterix_ir::model::{Action, Load, Model};
 use matterix_ir::plan::{Motion, Operation, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
@@ -12,7 +12,7 @@ use matterix_ir::{Leaves, NodeId};
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
-use crate::motion::{Refused, Stage, supported};
+use crate::motion::{Burden, Refused, Stage, supported};
 use crate::process::{Advance, Engine, Watch};
 
 /// What moves through space.
@@ -142,9 +142,11 @@ impl<'m> Sim<'m> {
         };
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
-        let held = self.prepared.model.loose.iter().filter(|loose| stage.held_by(loose.instance).is_some());
-        let volumes: Vec<_> = held.map(|loose| (loose.instance, self.engine.eval(loose.volume))).collect();
-        stage.holds_loose(volumes);
+        let held = self.prepared.model.loads.iter().filter(|load| stage.held_by(load.instance).is_some());
+        let value = |node: Option<NodeId>| node.map(|node| self.engine.eval(node));
+        let burden = |load: &Load| Burden { loose: value(load.loose), borne: value(load.borne) };
+        let burdens: Vec<_> = held.map(|load| (load.instance, burden(load))).collect();
+        stage.burden(burdens);
         let now = self.engine.time();
         let Some(performed) = stage.set_out(&motion, &values)? else {
             // What changes hands does so while both stand still.

@@ -3,6 +3,7 @@
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
 
+use super::pace::Burden;
 use super::performed::Performed;
 use super::stage::Stage;
 
@@ -23,8 +24,8 @@ pub struct Moment {
     pub links: Vec<Pose>,
     /// What it holds, in the lab.
     pub held: Option<(InstanceId, Pose)>,
-    /// The volume that is free to run out of it, m3, where that is known.
-    pub loose: Option<f64>,
+    /// What is known of that.
+    pub burden: Burden,
 }
 
 impl Stage<'_> {
@@ -35,12 +36,21 @@ impl Stage<'_> {
             let links = fixture.links().into_iter().map(|l| base.then(l)).collect();
             let (joints, still) = (fixture.joints.clone(), vec![0.0; fixture.joints.len()]);
             let (speeds, accelerations) = (still.clone(), still);
-            return Some(Moment { time, robot, joints, speeds, accelerations, links, held: None, loose: None });
+            return Some(Moment {
+                time,
+                robot,
+                joints,
+                speeds,
+                accelerations,
+                links,
+                held: None,
+                burden: Burden::default(),
+            });
         }
         let actor = self.actors.get(&robot)?;
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
-        let loose = held.and_then(|(id, _)| self.loose.get(&id).copied());
+        let burden = held.and_then(|(id, _)| self.burdens.get(&id).copied()).unwrap_or_default();
         let still = vec![0.0; actor.joints.len()];
         Some(Moment {
             time,
@@ -50,7 +60,7 @@ impl Stage<'_> {
             accelerations: still,
             links,
             held,
-            loose,
+            burden,
         })
     }
 

@@ -21,7 +21,7 @@ impl Stage<'_> {
     /// Carries out a motion, as slowly as what the robot holds needs so that nothing runs over. `values` are those of
     /// [`Motion::values`], SI.
     pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
-        if self.loose.is_empty() {
+        if self.burdens.is_empty() {
             return self.carry_out(motion, values);
         }
         let before = self.clone();

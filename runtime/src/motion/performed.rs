@@ -35,13 +35,18 @@ impl Performed {
         Performed { robot, parts, led: None }
     }
 
-    /// The same, all of it so many times as long in time.
-    pub(super) fn slowed(mut self, times: f64) -> Self {
-        for part in &mut self.parts {
-            part.wait *= times;
-            part.trajectory = part.trajectory.slowed(times);
+    /// The same, all of it so many times as long in time, after a wait, s.
+    pub(super) fn paced(mut self, (times, wait): (f64, f64)) -> Self {
+        if times > 1.0 {
+            for part in &mut self.parts {
+                part.wait *= times;
+                part.trajectory = part.trajectory.slowed(times);
+            }
+            self.led.iter_mut().for_each(|led| led.since *= times);
         }
-        self.led.iter_mut().for_each(|led| led.since *= times);
+        if let Some(first) = self.parts.first_mut() {
+            first.wait += wait;
+        }
         self
     }
 

@@ -35,6 +35,8 @@ pub enum Refused {
     TooWide(f64, f64),
     /// What is to stay upright tilts by so much where the way begins or ends, rad.
     Tilted(f64),
+    /// What it holds slips out of its fingers at rest: they bear so much acceleration, m/s2.
+    Slips(InstanceId, f64),
     /// So much runs out of what it holds however slowly it goes, m3.
     Spills(InstanceId, f64),
     /// So many positions were given for so many joints.
@@ -59,6 +61,7 @@ impl Refused {
             Refused::TooWide(..) => "too_wide",
             Refused::Tilted(_) => "no_way",
             Refused::Spills(..) => "spilled",
+            Refused::Slips(..) => "slip",
             Refused::Joints(..) | Refused::Beyond(_) => "unreachable",
         }
     }
@@ -96,6 +99,10 @@ impl Refused {
                 format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
             }
             Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
+            Refused::Slips(item, borne) => {
+                let item = &scene.get(*item).name;
+                format!("the fingers of `{name}` bear {:.2} of the weight of `{item}`", borne / 9.806_65)
+            }
             Refused::Spills(item, lost) => {
                 let item = &scene.get(*item).name;
                 format!("`{name}` tilts `{item}` so far that {:.1} mL run out", lost * 1e6)

@@ -21,6 +21,7 @@ use super::figures::Figures;
 use super::fingers::Fingers;
 use super::fixture::{Fixture, following, initial};
 use super::flight::Flight;
+use super::pace::Burden;
 use super::slosh::Wave;
 
 /// A robot and how it stands. What stays the same is shared by all copies of a stage.
@@ -80,8 +81,8 @@ pub struct Stage<'p> {
     pub(super) effort: Cell<u64>,
     /// What cannot be told: empty in a run.
     pub unknown: Unknown,
-    /// Volumes that are free to run out of things, m3, as far as they are known.
-    pub(super) loose: BTreeMap<InstanceId, f64>,
+    /// What is known of things in hand.
+    pub(super) burdens: BTreeMap<InstanceId, Burden>,
     /// The waves that motions left in what was carried, each with when that was, s.
     pub(super) waves: BTreeMap<InstanceId, (Wave, f64)>,
     /// Shared by all copies of a stage.
@@ -143,7 +144,7 @@ impl<'p> Stage<'p> {
             changes: 0,
             effort: Cell::default(),
             unknown: Unknown::default(),
-            loose: BTreeMap::new(),
+            burdens: BTreeMap::new(),
             waves: BTreeMap::new(),
             figures: Figures::default(),
             bodies: Arc::default(),

@@ -32,11 +32,11 @@ struct Tilting {
     inner: Pose,
     /// How high the point is above the base of what is held, m.
     height: f64,
-    /// How far from the frame the point is held once it is tilted, in the axes of the lab, m.
+    /// How far from the frame the point is held once it is tilted, m: the way it sinks, aside, up.
     shift: [f64; 3],
 }
 
-/// How something is tilted over a frame already: its angle, rad, and how far from the frame its point is, m.
+/// How something is tilted over a frame already: its angle, rad, and how far from the frame its point is, m, as in [`Tilting::shift`].
 #[derive(Clone, Copy)]
 struct Begun {
     angle: f64,
@@ -46,9 +46,7 @@ struct Begun {
 impl Tilting {
     /// With the point so far from the frame.
     fn at(&self, angle: f64, off: [f64; 3]) -> Pose {
-        let mut at = self.to.then(about_y(angle)).then(self.point).then(self.inner);
-        at.position.iter_mut().zip(off).for_each(|(x, by)| *x += by);
-        at
+        self.to.then(Pose::at(off)).then(about_y(angle)).then(self.point).then(self.inner)
     }
 
     /// With the base no lower than the frame.
@@ -80,7 +78,8 @@ impl Tilting {
     /// How it is tilted already, if the tip is where it is then, whatever its height.
     fn begun(&self, angle: f64, tip: Pose) -> Option<Begun> {
         let here = self.at(angle, [0.0; 3]);
-        let off = [0, 1, 2].map(|k| tip.position[k] - here.position[k]);
+        let away = [0, 1, 2].map(|k| self.to.position[k] + tip.position[k] - here.position[k]);
+        let off = self.to.inverse().point(away);
         let aside = off[0] - self.shift[0];
         let (aside, turned) = (aside.hypot(off[1] - self.shift[1]), distance(&pose(&here), &pose(&tip)).1);
         (aside < THERE && turned < THERE).then_some(Begun { angle, off })

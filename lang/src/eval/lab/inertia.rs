@@ -1,6 +1,7 @@
 //! Mass of a body and how it is distributed: given with `inertia`, or that of one density in its shape.
 
 use matterix_ir::inertia::{impossible, of_shapes};
+use matterix_ir::model::Load;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Inertial;
 use matterix_ir::scene::{InstanceId, frame};
@@ -17,8 +18,10 @@ const MASS: (&str, &str) = ("mass", "Mass");
 const FRICTION: (&str, &str) = ("friction", "Ratio");
 /// The member that says whether what is put on a surface stays for a moment only.
 const STOPOVER: &str = "stopover";
-/// The member that says what volume of its contents is free to run out over its rim.
+/// The members that say how what is held may be moved: the volume of its contents that is free to run out over its rim, and the acceleration
+/// that the grip on it bears.
 const LOOSE: (&str, &str) = ("loose", "Volume");
+const BORNE: (&str, &str) = ("borne", "Acceleration");
 
 /// How many times the moments may be above what the mass has where it is farthest from its centre: shapes are nominal.
 const NOMINAL: f64 = 2.0;
@@ -57,13 +60,19 @@ impl<'a> Elaborator<'a> {
         self.plain(id, FRICTION).filter(|f| f.is_finite())
     }
 
-    /// The volume of what an instance holds that is free to run out, if anything can ever be.
-    pub fn loose(&mut self, id: InstanceId) -> Option<NodeId> {
-        let member = self.members_of(id, LOOSE.0).first().copied()?;
+    /// How an instance may be moved by who holds it; nothing where any motion will do.
+    pub fn load(&mut self, id: InstanceId) -> Option<Load> {
+        let loose = self.changing(id, LOOSE).filter(|node| self.graph.constant(*node) != Some(0.0));
+        let borne = self.changing(id, BORNE).filter(|node| self.graph.constant(*node) != Some(f64::INFINITY));
+        (loose.is_some() || borne.is_some()).then_some(Load { instance: id, loose, borne })
+    }
+
+    /// The value of a member of this name and dimension, if the instance has one.
+    fn changing(&mut self, id: InstanceId, (name, dimension): (&str, &str)) -> Option<NodeId> {
+        let member = self.members_of(id, name).first().copied()?;
         let at = self.instances[id.0 as usize].span;
         let Value::Num(n) = self.member_value(id, member, at) else { return None };
-        let is_volume = n.dimension.agrees(&self.tables.units.named(LOOSE.1));
-        Some(n.node).filter(|node| is_volume && self.graph.constant(*node) != Some(0.0))
+        n.dimension.agrees(&self.tables.units.named(dimension)).then_some(n.node)
     }
 
     /// Whether what is put on an instance stays there for a moment only.

@@ -86,7 +86,7 @@ pub fn finding(
                 .help("take a robot whose description has joints before its field `base`")
         }
         Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
-        Refused::StandsOn | Refused::TooWide(..) => return None,
+        Refused::StandsOn | Refused::TooWide(..) | Refused::Slips(..) => return None,
     };
     let with = match refused {
         Refused::Collides(meeting) => meeting.with,

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Program, Span};
+use matterix_ir::{Diagnostic, NodeId, Program, Span};
 
 use super::beside::Moved;
 use super::course::{Cause, Course, Refusal};
@@ -12,6 +12,7 @@ use super::diagnostics;
 use super::memory::{Memory, Outcome};
 use super::more::More;
 use super::offer::Missed;
+use crate::motion::Burden;
 use crate::motion::refused::Refused;
 use crate::motion::stage::Stage;
 
@@ -55,9 +56,10 @@ impl<'p, 's> Looker<'p, 's> {
         // What only a run can tell is left to the run.
         let Some(motion) = motion.chosen(|node| course.values.value(model, node)) else { return course.drifts(robot) };
         let held = course.stage.held(robot);
-        let loose = model.loose.iter().find(|loose| held == Some(loose.instance));
-        let volume = loose.and_then(|loose| course.values.value(model, loose.volume));
-        course.stage.holds_loose(held.zip(volume));
+        let load = model.loads.iter().find(|load| held == Some(load.instance));
+        let value = |node: Option<NodeId>| node.and_then(|node| course.values.value(model, node));
+        let burden = load.map(|load| Burden { loose: value(load.loose), borne: value(load.borne) });
+        course.stage.burden(held.zip(burden.filter(|burden| *burden != Burden::default())));
         match &motion {
             Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),
             Motion::Free { item, on, .. } => self.free(course, &motion, robot, (*item, *on), site, beside),

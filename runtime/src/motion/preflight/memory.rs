@@ -90,9 +90,11 @@ impl<'s> Memory<'s> {
             Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
         values.iter().for_each(|v| hash.write_u64(v.to_bits()));
-        for (id, volume) in &stage.loose {
+        for (id, burden) in &stage.burdens {
             hash.write_u32(id.0);
-            hash.write_u64(volume.to_bits());
+            for known in [burden.loose, burden.borne] {
+                hash.write_u64(known.unwrap_or(f64::NAN).to_bits());
+            }
         }
         seal::hex(&hash)
     }

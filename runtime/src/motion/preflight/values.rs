@@ -241,6 +241,9 @@ fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
             open.extend(motion.choice());
         }
     }
+    if pours {
+        open.extend(model.loads.iter().flat_map(|load| [load.loose, load.borne]).flatten());
+    }
     let by_laws = model.derivatives.iter().map(|d| d.state);
     let mixed = model.mixtures.iter().filter(|_| !pours);
     let in_mixtures = mixed.flat_map(|m| m.extensive.iter().map(|(_, state)| *state));

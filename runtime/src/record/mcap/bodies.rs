@@ -1,4 +1,4 @@
-//! `/bodies`: true shapes and joints, once; `/grips`: what is in the hands of robots, `/loose`: what can run out of that, whenever they change.
+//! `/bodies`: true shapes and joints, once; `/grips`: what is in the hands of robots, `/burdens`: how that may be moved, whenever they change.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -21,18 +21,21 @@ pub(super) struct Grip<'a> {
     pub(super) items: Vec<&'a str>,
 }
 
-/// What is free to run out of a thing in hand from now on.
+/// How a thing in hand may be moved from now on.
 #[derive(Serialize)]
-pub(super) struct Loose<'a> {
+pub(super) struct Burdened<'a> {
     pub(super) item: &'a str,
-    /// m3.
-    pub(super) volume: f64,
+    /// What is free to run out of it, m3.
+    pub(super) loose: f64,
+    /// What acceleration, of gravity and of the motion, the grip on it bears, m/s2; none where that has no limit.
+    pub(super) borne: Option<f64>,
 }
 
-/// Schema of [`Loose`].
-pub(super) fn loose_schema() -> Value {
-    let volume = json!({ "type": "number", "description": "What can run over its rim, m3" });
-    object("matterix.Loose", [("item", text("Name of the vessel")), ("volume", volume)])
+/// Schema of [`Burdened`].
+pub(super) fn burden_schema() -> Value {
+    let loose = json!({ "type": "number", "description": "What can run over its rim, m3" });
+    let borne = json!({ "type": ["number", "null"], "description": "Acceleration, of gravity and motion, that the grip bears, m/s2; null if unlimited" });
+    object("matterix.Burden", [("item", text("Name of the thing")), ("loose", loose), ("borne", borne)])
 }
 
 /// Schema of [`Grip`].

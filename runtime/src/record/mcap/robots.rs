@@ -17,7 +17,7 @@ use super::foxglove::{
     quaternion, vector,
 };
 use super::replay::Replay;
-use crate::motion::{Moment, Stage};
+use crate::motion::{Burden, Moment, Stage};
 use crate::record::run::Run;
 
 /// Of links that have no colour of their own.
@@ -30,9 +30,9 @@ pub(super) struct Robots {
     joints: u16,
     grips: u16,
     loads: u16,
-    loose: u16,
-    /// By thing in hand, the volume that was last free to run out of it, m3.
-    volumes: BTreeMap<InstanceId, f64>,
+    burdens: u16,
+    /// By thing in hand, what was last known of it.
+    known: BTreeMap<InstanceId, Burden>,
     /// By robot, what it last held.
     hands: BTreeMap<InstanceId, InstanceId>,
     /// The first moment that has not been written.
@@ -48,14 +48,14 @@ impl Robots {
         frames: u16,
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
-        let (names, volumes, hands) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, loose: 0, volumes, hands, next: 0 };
+        let (names, known, hands) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, known, hands, next: 0 };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
         out.joints = sink.channel("/joints", "foxglove.JointStates", &foxglove::joints_schema(), &units)?;
         out.grips = sink.channel("/grips", "matterix.Grip", &bodies::grip_schema(), &units)?;
-        out.loose = sink.channel("/loose", "matterix.Loose", &bodies::loose_schema(), &units)?;
+        out.burdens = sink.channel("/burdens", "matterix.Burden", &bodies::burden_schema(), &units)?;
         if !stage.scene.carriers.is_empty() {
             out.loads = sink.channel("/loads", "matterix.Load", &bodies::load_schema(), &units)?;
         }
@@ -90,7 +90,7 @@ impl Robots {
             self.next += 1;
             replay.moment(moment);
             self.grip(&replay.stage, moment, sink)?;
-            self.fill(run, moment, sink)?;
+            self.burden(run, moment, sink)?;
             self.write(moment, sink, frames)?;
             travelled = true;
             for (robot, items) in replay.loads() {
@@ -124,14 +124,16 @@ impl Robots {
         sink.push(self.grips, moment.time, &bodies::Grip { robot, items })
     }
 
-    /// Writes what is free to run out of what is in a hand, where that is not what it was.
-    fn fill<W: Write + Seek>(&mut self, run: &Run<'_>, moment: &Moment, sink: &mut Sink<W>) -> McapResult<()> {
-        let (Some((id, _)), Some(volume)) = (moment.held, moment.loose) else { return Ok(()) };
-        if self.volumes.insert(id, volume) == Some(volume) {
+    /// Writes what is known of what is in a hand, where that is not what it was.
+    fn burden<W: Write + Seek>(&mut self, run: &Run<'_>, moment: &Moment, sink: &mut Sink<W>) -> McapResult<()> {
+        let Some((id, _)) = moment.held.filter(|_| moment.burden != Burden::default()) else { return Ok(()) };
+        if self.known.insert(id, moment.burden) == Some(moment.burden) {
             return Ok(());
         }
         let item = run.program.scene.get(id).name.as_str();
-        sink.push(self.loose, moment.time, &bodies::Loose { item, volume })
+        let Burden { loose, borne } = moment.burden;
+        let borne = borne.filter(|borne| borne.is_finite());
+        sink.push(self.burdens, moment.time, &bodies::Burdened { item, loose: loose.unwrap_or_default(), borne })
     }
 
     fn write<W: Write + Seek>(&self, moment: &Moment, sink: &mut Sink<W>, frames: u16) -> McapResult<()> {

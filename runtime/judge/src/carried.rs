@@ -1,4 +1,4 @@
-//! Liquids in open vessels that robots carry: what runs over the rim as a vessel tilts or is moved too quickly.
+//! What robots carry: whether the grip on it bears the motion, and what runs over the rim of an open vessel as it tilts or is moved too quickly.
 //!
 //! The level stands across the pull that is felt, of gravity and of the vessel's own motion, as the first wave in a round vessel follows that
 //! (a pendulum of its frequency), and what is above the rim's lowest point then is lost. What a wave throws over a rim that is above the
@@ -21,6 +21,9 @@ const DAMPING: f64 = 0.01;
 /// Steps in time, s, and how long a wave is followed when the robot stands, s.
 const STEP: f64 = 2e-3;
 const AFTER: f64 = 0.6;
+/// Accelerations are those over so long, s, and count from so many times what a grip bears.
+const GIVES: f64 = 1e-2;
+const NOMINAL: f64 = 1.02;
 /// What runs over counts from this share of what fills the vessel on: dimensions are nominal.
 const SLACK: f64 = 5e-3;
 
@@ -40,8 +43,10 @@ pub(crate) fn judge(film: &Trajectory, index: usize, wrong: &mut Vec<Wrong>) {
         let Some(&(item, inner)) = grip.items.first() else { continue };
         let until = robot.grips.get(place + 1).map_or(f64::INFINITY, |next| next.time);
         let moves = spans(robot, grip.time, until);
-        let found = moves.into_iter().filter_map(|span| film.spilled(robot, (item, inner), span));
-        wrong.extend(found.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(wrong, _)| wrong));
+        let worst = |found: &mut dyn Iterator<Item = (Wrong, f64)>| found.max_by(|a, b| a.1.total_cmp(&b.1));
+        let spilled = worst(&mut moves.iter().filter_map(|span| film.spilled(robot, (item, inner), *span)));
+        let slipped = worst(&mut moves.iter().filter_map(|span| film.slipped(robot, (item, inner), *span)));
+        wrong.extend([spilled, slipped].into_iter().flatten().map(|(wrong, _)| wrong));
     }
 }
 
@@ -61,6 +66,33 @@ fn spans(robot: &Robot, from: f64, to: f64) -> Vec<[f64; 2]> {
 }
 
 impl Trajectory {
+    /// Where a thing in hand is pulled the most beyond what the grip on it bears, with by how much that is.
+    fn slipped(&self, robot: &Robot, (item, inner): (usize, Isometry), [from, to]: [f64; 2]) -> Option<(Wrong, f64)> {
+        let thing = &self.things[item];
+        let middle = thing.middle();
+        let place = |time: f64| {
+            let tip = *robot.links(time).get(robot.machine.tip as usize)?;
+            Some(pose(&(tip * inner)).point(middle))
+        };
+        let steps = ((to - from) / STEP).ceil() as u32;
+        let mut worst: Option<(Wrong, f64)> = None;
+        for step in 0..=steps {
+            let time = from + f64::from(step) * STEP;
+            let borne = thing.borne(time);
+            if borne.is_infinite() {
+                continue;
+            }
+            // Over as long as fingers give way: what is recorded is a cubic from sample to sample.
+            let [a, b, c] = [place(time - GIVES)?, place(time)?, place(time + GIVES)?];
+            let [x, y, z] = [0, 1, 2].map(|k| (c[k] - 2.0 * b[k] + a[k]) / (GIVES * GIVES));
+            let pull = (x * x + y * y + (z + GRAVITY) * (z + GRAVITY)).sqrt();
+            if pull > borne * NOMINAL && worst.as_ref().is_none_or(|(_, most)| pull / borne > *most) {
+                worst = Some((Wrong::Slips { item: thing.name.clone(), pull, borne, time }, pull / borne));
+            }
+        }
+        worst
+    }
+
     /// The most that runs over while a thing in hand is moved from one time to another, with what share of the vessel that is.
     fn spilled(&self, robot: &Robot, (item, inner): (usize, Isometry), [from, to]: [f64; 2]) -> Option<(Wrong, f64)> {
         let thing = &self.things[item];

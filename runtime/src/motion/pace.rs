@@ -1,0 +1,259 @@
+//! How fast what robots hold can be moved: a motion that would throw contents over a rim, or pull a thing out of the fingers, goes as
+//! much slower.
+
+use std::f64::consts::PI;
+
+use matterix_ir::math::acos;
+use matterix_ir::plan::Motion;
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::InstanceId;
+
+use super::performed::Performed;
+use super::refused::Refused;
+use super::slosh::{Filled, GRAVITY, Wave};
+use super::stage::Stage;
+
+/// How far apart in time a motion is looked at, s.
+const APART: f64 = 0.005;
+/// How often a wave is looked at in one of its periods after a motion has ended.
+const AFTER: u32 = 24;
+/// By how much more than it is the wave that a motion leaves could be without loss.
+const ROOM: f64 = 2.0;
+/// Waves and pulls count for so much more than they are: what is known of a thing and a motion is off by some percent.
+const MARGIN: f64 = 1.1;
+/// No wave is steeper than this, rad: beyond it waves break, and the law of small ones says nothing.
+const STEEP: f64 = PI / 6.0;
+/// A motion is made so many times as long at most.
+const SLOWEST: f64 = 30.0;
+/// How finely it is found how many times.
+const FINE: f64 = 0.01;
+/// A motion waits for a wave to die out in such steps, and so long at most, s.
+const WAIT: f64 = 0.25;
+const LONGEST: f64 = 60.0;
+
+/// What is known of a thing in hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Burden {
+    /// The volume of its contents that is free to run out, m3.
+    pub loose: Option<f64>,
+    /// The acceleration, of gravity and of the motion, that the grip on it bears, m/s2.
+    pub borne: Option<f64>,
+}
+
+/// How a thing is moved, evenly in time: the way of a point of it, its axis, and the way of its centre of mass.
+struct Ride {
+    apart: f64,
+    way: Vec<[f64; 3]>,
+    axes: Vec<[f64; 3]>,
+    middles: Vec<[f64; 3]>,
+}
+
+/// What becomes of a thing while it is moved.
+#[derive(Clone, Copy, Debug, Default)]
+struct Swing {
+    /// How far the level of its contents is from straight across it at most, and from level, rad.
+    across: f64,
+    steep: f64,
+    /// The wave in it at the end.
+    wave: Wave,
+}
+
+/// So many times as long in time, and so much later, s.
+type Pace = (f64, f64);
+
+impl Ride {
+    /// What becomes of a liquid's surface where the motion begins with a wave.
+    fn swing(&self, (times, wait): Pace, mut wave: Wave, frequency: f64) -> Swing {
+        let dt = self.apart * times;
+        let mut most = Swing::default();
+        let mut look = |axis: [f64; 3], pull: [f64; 2], by: f64, lift: f64| {
+            let [x, y] = pull.map(|pull| pull * by);
+            let up = [x, y, GRAVITY + lift];
+            most.across = most.across.max(between(axis, up));
+            most.steep = most.steep.max(between([0.0, 0.0, 1.0], up));
+        };
+        wave.follow([0.0; 2], frequency, wait);
+        for (index, axis) in self.axes.iter().enumerate() {
+            let felt = felt(&self.way, index, dt);
+            wave.follow([felt[0], felt[1]], frequency, dt);
+            look(*axis, wave.pull, MARGIN, felt[2]);
+        }
+        // The wave goes on when the vessel stands, and meets another motion then: that finds half of the room.
+        let step = 2.0 * PI / frequency / f64::from(AFTER);
+        let mut left = wave;
+        for axis in self.axes.last().into_iter().cycle().take(AFTER as usize) {
+            left.follow([0.0; 2], frequency, step);
+            look(*axis, left.pull, ROOM, 0.0);
+        }
+        Swing { wave, ..most }
+    }
+
+    /// The greatest acceleration of the centre of mass with that of gravity, m/s2.
+    fn pull(&self, times: f64) -> f64 {
+        let dt = self.apart * times;
+        let felt = (0..self.middles.len()).map(|index| felt(&self.middles, index, dt));
+        felt.map(|[x, y, z]| (x * x + y * y + (z + GRAVITY).powi(2)).sqrt()).fold(GRAVITY, f64::max)
+    }
+
+    /// Whether the thing is tilted less at the end than at the beginning.
+    fn is_set_upright(&self) -> bool {
+        let height = |axis: Option<&[f64; 3]>| axis.map_or(0.0, |axis| axis[2]);
+        height(self.axes.last()) > height(self.axes.first()) + 1e-9
+    }
+
+    /// The greatest tilt of the thing itself, rad.
+    fn own_tilt(&self) -> f64 {
+        self.axes.iter().map(|axis| between(*axis, [0.0, 0.0, 1.0])).fold(0.0, f64::max)
+    }
+}
+
+/// The acceleration at a place of a way; it rests before and after.
+fn felt(way: &[[f64; 3]], index: usize, dt: f64) -> [f64; 3] {
+    let at = |i: usize| way[i.min(way.len() - 1)];
+    let (before, here, after) = (at(index.saturating_sub(1)), at(index), at(index + 1));
+    [0, 1, 2].map(|k| (after[k] - 2.0 * here[k] + before[k]) / (dt * dt))
+}
+
+/// The angle between two directions, rad.
+fn between(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let size = (dot(a, a) * dot(b, b)).sqrt();
+    if size > 0.0 { acos((dot(a, b) / size).clamp(-1.0, 1.0)) } else { 0.0 }
+}
+
+/// The least number of times as long, from `least` on, at which nothing is wild any more.
+fn times(least: f64, is_wild: impl Fn(f64) -> bool) -> f64 {
+    if !is_wild(least) {
+        return least;
+    }
+    let (mut wild, mut calm) = (least, SLOWEST.max(least));
+    while calm - wild > FINE * wild {
+        let middle = 0.5 * (wild + calm);
+        if is_wild(middle) { wild = middle } else { calm = middle }
+    }
+    calm
+}
+
+impl Stage<'_> {
+    /// What is known now of the things in hand.
+    pub fn burden(&mut self, burdens: impl IntoIterator<Item = (InstanceId, Burden)>) {
+        self.burdens = burdens.into_iter().collect();
+    }
+
+    /// A motion that has been planned and not begun yet, as slow as what the robot holds needs; refused where that does not help. Of what
+    /// pours, or is set upright again where it has poured, contents may run out.
+    pub(super) fn calmed(
+        &mut self,
+        before: &Stage<'_>,
+        motion: &Motion,
+        performed: Performed,
+    ) -> Result<Performed, Refused> {
+        let Some(held) = before.held(performed.robot).filter(|held| self.held(performed.robot) == Some(*held)) else {
+            return Ok(performed);
+        };
+        let Some(Burden { loose, borne }) = self.burdens.get(&held).copied() else { return Ok(performed) };
+        let shape = self.scene.get(held).shape.as_ref();
+        let filled = shape.zip(loose).and_then(|(shape, volume)| Filled::of(shape, volume));
+        let ride = before.ride(&performed, held, filled.as_ref().map_or(0.0, |filled| filled.surface));
+        let borne = borne.unwrap_or(f64::INFINITY);
+        if borne < GRAVITY {
+            return Err(Refused::Slips(held, borne));
+        }
+        let slow = times(1.0, |times| (ride.pull(times) - GRAVITY) * MARGIN + GRAVITY > borne);
+        let pours = matches!(motion, Motion::Tilted { within: Some(_), .. });
+        let rights = matches!(motion, Motion::Tilted { .. }) && ride.is_set_upright();
+        let mut pace = (slow, 0.0);
+        if let Some(filled) = &filled {
+            let (mut wave, since) = before.waves.get(&held).copied().unwrap_or_default();
+            wave.follow([0.0; 2], filled.frequency, (before.now - since).max(0.0));
+            if !pours && !rights {
+                let lost = filled.lost(ride.own_tilt());
+                if lost > 0.0 {
+                    return Err(Refused::Spills(held, lost));
+                }
+                pace = filled.calm(&ride, wave, slow);
+            }
+            let wave = ride.swing(pace, wave, filled.frequency).wave;
+            self.waves.insert(held, (wave, before.now + performed.duration() * pace.0 + pace.1));
+        }
+        Ok(performed.paced(pace))
+    }
+
+    /// How a thing in hand is moved on a way that begins as things stand now.
+    fn ride(&self, performed: &Performed, held: InstanceId, surface: f64) -> Ride {
+        let mut stage = self.clone();
+        let thing = self.scene.get(held);
+        let middle = match &thing.inertial {
+            Some(inertial) => inertial.placement.position,
+            None => [0.0, 0.0, thing.shape.as_ref().map_or(0.0, |shape| 0.5 * shape.size()[2])],
+        };
+        let duration = performed.duration();
+        let steps = (duration / APART).ceil().max(1.0) as u32;
+        let mut ride =
+            Ride { apart: duration / f64::from(steps), way: Vec::new(), axes: Vec::new(), middles: Vec::new() };
+        for step in 0..=steps {
+            let since = duration * f64::from(step) / f64::from(steps);
+            if let Some(actor) = stage.actors.get_mut(&performed.robot) {
+                performed.bring(actor, since);
+            }
+            let at: Pose = stage.pose(held);
+            ride.way.push(at.point([0.0, 0.0, surface]));
+            ride.axes.push([0, 1, 2].map(|k| at.point([0.0, 0.0, 1.0])[k] - at.position[k]));
+            ride.middles.push(at.point(middle));
+        }
+        ride
+    }
+}
+
+impl Filled {
+    /// How much slower, and later, a motion goes that is at least so many times as long.
+    fn calm(&self, ride: &Ride, wave: Wave, least: f64) -> Pace {
+        let is_wild = |pace: Pace| {
+            let swing = ride.swing(pace, wave, self.frequency);
+            swing.steep > STEEP || self.lost(swing.across) > 0.0
+        };
+        // What is left of a wave from before dies out by itself only.
+        let mut wait = 0.0;
+        while wait < LONGEST && is_wild((SLOWEST.max(least), wait)) {
+            wait += WAIT;
+        }
+        (times(least, |times| is_wild((times, wait))), wait)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_pushed_slowly_tilts_as_in_a_lift_and_what_is_pushed_at_once_twice_as_far() {
+        // 0.2 m in a straight line, at 1 m/s2 first one way and then the other.
+        let line = |apart: f64| {
+            let half = 0.2_f64.sqrt();
+            let at = |t: f64| if t < half { 0.5 * t * t } else { 0.2 - 0.5 * (2.0 * half - t).max(0.0).powi(2) };
+            let steps = (2.0 * half / apart) as usize;
+            let way: Vec<[f64; 3]> = (0..=steps).map(|i| [at(i as f64 * apart), 0.0, 0.0]).collect();
+            Ride { apart, axes: vec![[0.0, 0.0, 1.0]; way.len()], middles: Vec::new(), way }
+        };
+        let pull = |times: f64, frequency: f64| {
+            let ride = line(APART);
+            ride.swing((times, 0.0), Wave::default(), frequency).across.tan() * GRAVITY
+        };
+        // A wave much quicker than the motion swings twice as far as each push, and after a push that turns about three times; what is
+        // left of it at the end counts twice.
+        let quick = pull(1.0, 60.0);
+        assert!((1.9..=8.1).contains(&quick), "{quick}");
+        let slow = pull(10.0, 23.0);
+        assert!(slow < 0.09, "{slow}");
+    }
+
+    #[test]
+    fn a_ride_pulls_as_much_as_it_is_sped_up() {
+        // Up at 2 m/s2: 11.8 m/s2 with gravity; four times as slowly an eighth of a metre per second squared of its own.
+        let way: Vec<[f64; 3]> = (0..200).map(|i| [0.0, 0.0, (f64::from(i) * APART).powi(2)]).collect();
+        let ride = Ride { apart: APART, axes: vec![[0.0, 0.0, 1.0]; way.len()], middles: way[..150].to_vec(), way };
+        assert!((ride.pull(1.0) - GRAVITY - 2.0).abs() < 1e-6 || ride.pull(1.0) > GRAVITY + 2.0);
+        assert_eq!(times(1.0, |times| times < 3.0).round(), 3.0);
+        assert_eq!(times(1.0, |_| false), 1.0);
+    }
+}
