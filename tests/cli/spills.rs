@@ -40,10 +40,7 @@ fn judged(name: &str, text: &str) -> String {
 fn a_full_beaker_is_carried_more_slowly_than_an_empty_one_and_one_that_may_spill() {
     let carry = "pick source by panda\n    move panda to target.pre_grasp\n    put back source by panda";
     let way = |name: &str, arm: &str, volume: &str| {
-        lasted(
-            &judged(name, &bench(arm, "Beaker250mL", volume, "", carry).replace("std::skills", "")),
-            "move panda to source.pre_stand",
-        )
+        lasted(&judged(name, &bench(arm, "Beaker250mL", volume, "", carry)), "move panda to source.pre_stand")
     };
     let (full, half) = (way("spills_full", "", "300 mL"), way("spills_half", "", "120 mL"));
     let spilling = way("spills_allowed", ", may_spill: true", "300 mL");
@@ -141,4 +138,27 @@ fn a_vessel_whose_inside_is_not_known_is_poured_from_as_the_arm_says() {
     write(&dir, "bench.mtx", &text.replace("source = Beaker250mL", "source = Jug"));
     let run = matterixc(&["run", dir.join("bench.mtx").to_str().expect("a path")]);
     assert_eq!(run.code, 0, "{}{}", run.out, run.err);
+}
+
+#[test]
+fn a_thing_that_a_grip_barely_bears_is_carried_more_slowly() {
+    let text = |friction: f64| {
+        format!(
+            "mtx 1\nuse std::robots::{{FrankaHand, FrankaPanda}}\nasset Block: Graspable {{\n    mass: 1.4 kg\n    \
+             friction: {friction}\n    shape: box(60 mm, 60 mm, 140 mm)\n    frame grasp at (0, 0, 120) mm\n}}\n\
+             asset Mat: Surface {{\n    mass: 1 kg\n    shape: box(200 mm, 200 mm, 20 mm)\n}}\nlab bench {{\n    \
+             ambient: 22 degC\n    table = OpticalTable at (0, 0, 0) m\n    \
+             arm = FrankaPanda {{ gripper: FrankaHand {{}} }} on table at (0, 0) mm\n    \
+             block = Block on table at (450, -200) mm\n    mat = Mat on table at (450, 250) mm\n}}\n\
+             workflow run in bench {{\n    place block on mat by arm\n}}\n"
+        )
+    };
+    // The hand presses with 70 N: 0.105 bear 14.7 N, and the block weighs 13.7 N.
+    let way = |name: &str, friction: f64| lasted(&judged(name, &text(friction)), "move arm to mat.pre_place");
+    let (barely, well) = (way("spills_barely", 0.105), way("spills_well", 0.6));
+    assert!(barely > 1.5 * well, "{barely} s, {well} s");
+    let dir = folder("spills_slips");
+    write(&dir, "bench.mtx", &text(0.09));
+    let weak = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+    assert!(weak.code == 1 && weak.out.contains("grip-too-weak"), "{}", weak.out);
 }

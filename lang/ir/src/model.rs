@@ -347,8 +347,8 @@ pub struct Load {
     pub instance: InstanceId,
     /// The volume of its contents that is free to run out over its rim, m3; 0 where nothing can.
     pub loose: Option<NodeId>,
-    /// The acceleration, of gravity and of the motion, that the grip on it bears, m/s2.
-    pub borne: Option<NodeId>,
+    /// The share of what the grip on it bears that an acceleration, of gravity or of a motion, of 1 m/s2 takes up.
+    pub taxed: Option<NodeId>,
 }
 
 /// The flattened model of one lab.

@@ -74,7 +74,9 @@ impl Trajectory {
             let tip = *robot.links(time).get(robot.machine.tip as usize)?;
             Some(pose(&(tip * inner)).point(middle))
         };
-        let steps = ((to - from) / STEP).ceil() as u32;
+        // Before, the hand was empty.
+        let from = from + GIVES;
+        let steps = ((to - from) / STEP).ceil().max(0.0) as u32;
         let mut worst: Option<(Wrong, f64)> = None;
         for step in 0..=steps {
             let time = from + f64::from(step) * STEP;

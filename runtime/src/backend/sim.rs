@@ -144,7 +144,7 @@ impl<'m> Sim<'m> {
         stage.come_to(self.engine.time());
         let held = self.prepared.model.loads.iter().filter(|load| stage.held_by(load.instance).is_some());
         let value = |node: Option<NodeId>| node.map(|node| self.engine.eval(node));
-        let burden = |load: &Load| Burden { loose: value(load.loose), borne: value(load.borne) };
+        let burden = |load: &Load| Burden::of(load, value);
         let burdens: Vec<_> = held.map(|load| (load.instance, burden(load))).collect();
         stage.burden(burdens);
         let now = self.engine.time();

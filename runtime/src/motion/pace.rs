@@ -3,7 +3,9 @@
 
 use std::f64::consts::PI;
 
+use matterix_ir::NodeId;
 use matterix_ir::math::acos;
+use matterix_ir::model::Load;
 use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
@@ -38,6 +40,14 @@ pub struct Burden {
     pub loose: Option<f64>,
     /// The acceleration, of gravity and of the motion, that the grip on it bears, m/s2.
     pub borne: Option<f64>,
+}
+
+impl Burden {
+    /// That of a thing, with the values of expressions as far as they are known.
+    pub fn of(load: &Load, value: impl Fn(Option<NodeId>) -> Option<f64>) -> Self {
+        let borne = value(load.taxed).filter(|taxed| *taxed > 0.0).map(f64::recip);
+        Burden { loose: value(load.loose), borne }
+    }
 }
 
 /// How a thing is moved, evenly in time: the way of a point of it, its axis, and the way of its centre of mass.

@@ -18,10 +18,10 @@ const MASS: (&str, &str) = ("mass", "Mass");
 const FRICTION: (&str, &str) = ("friction", "Ratio");
 /// The member that says whether what is put on a surface stays for a moment only.
 const STOPOVER: &str = "stopover";
-/// The members that say how what is held may be moved: the volume of its contents that is free to run out over its rim, and the acceleration
-/// that the grip on it bears.
+/// The members that say how what is held may be moved: the volume of its contents that is free to run out over its rim, and the share of what
+/// the grip bears that an acceleration takes up.
 const LOOSE: (&str, &str) = ("loose", "Volume");
-const BORNE: (&str, &str) = ("borne", "Acceleration");
+const TAXED: (&str, &str) = ("taxed", "Ratio");
 
 /// How many times the moments may be above what the mass has where it is farthest from its centre: shapes are nominal.
 const NOMINAL: f64 = 2.0;
@@ -62,17 +62,19 @@ impl<'a> Elaborator<'a> {
 
     /// How an instance may be moved by who holds it; nothing where any motion will do.
     pub fn load(&mut self, id: InstanceId) -> Option<Load> {
-        let loose = self.changing(id, LOOSE).filter(|node| self.graph.constant(*node) != Some(0.0));
-        let borne = self.changing(id, BORNE).filter(|node| self.graph.constant(*node) != Some(f64::INFINITY));
-        (loose.is_some() || borne.is_some()).then_some(Load { instance: id, loose, borne })
+        let loose = self.changing(id, LOOSE);
+        let taxed = self.changing(id, TAXED);
+        (loose.is_some() || taxed.is_some()).then_some(Load { instance: id, loose, taxed })
     }
 
-    /// The value of a member of this name and dimension, if the instance has one.
+    /// The value of a member of this name and dimension, if the instance has one that is not always 0.
     fn changing(&mut self, id: InstanceId, (name, dimension): (&str, &str)) -> Option<NodeId> {
         let member = self.members_of(id, name).first().copied()?;
         let at = self.instances[id.0 as usize].span;
         let Value::Num(n) = self.member_value(id, member, at) else { return None };
-        n.dimension.agrees(&self.tables.units.named(dimension)).then_some(n.node)
+        let counts =
+            n.dimension.agrees(&self.tables.units.named(dimension)) && self.graph.constant(n.node) != Some(0.0);
+        counts.then_some(n.node)
     }
 
     /// Whether what is put on an instance stays there for a moment only.

@@ -68,8 +68,8 @@ pub fn finding(
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
         Refused::Spills(item, lost) => {
-            let headline = format!("`{arm}` spills what `{}` holds {to}", name(*item));
-            let label = format!("{:.1} mL run out, however slowly it goes", lost * 1e6);
+            let headline = format!("`{}` runs over in the hand of `{arm}`", name(*item));
+            let label = format!("it tilts so far that {:.1} mL run out", lost * 1e6);
             Diagnostic::error(codes::SPILLED, span, headline, label)
         }
         Refused::Joints(given, there) => {

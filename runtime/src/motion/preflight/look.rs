@@ -58,7 +58,7 @@ impl<'p, 's> Looker<'p, 's> {
         let held = course.stage.held(robot);
         let load = model.loads.iter().find(|load| held == Some(load.instance));
         let value = |node: Option<NodeId>| node.and_then(|node| course.values.value(model, node));
-        let burden = load.map(|load| Burden { loose: value(load.loose), borne: value(load.borne) });
+        let burden = load.map(|load| Burden::of(load, value));
         course.stage.burden(held.zip(burden.filter(|burden| *burden != Burden::default())));
         match &motion {
             Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),

@@ -242,7 +242,7 @@ fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
         }
     }
     if pours {
-        open.extend(model.loads.iter().flat_map(|load| [load.loose, load.borne]).flatten());
+        open.extend(model.loads.iter().flat_map(|load| [load.loose, load.taxed]).flatten());
     }
     let by_laws = model.derivatives.iter().map(|d| d.state);
     let mixed = model.mixtures.iter().filter(|_| !pours);
