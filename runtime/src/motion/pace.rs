@@ -102,7 +102,7 @@ impl Ride {
     fn pull(&self, times: f64) -> f64 {
         let dt = self.apart * times;
         let felt = (0..self.middles.len()).map(|index| felt(&self.middles, index, dt));
-        felt.map(|[x, y, z]| (x * x + y * y + (z + GRAVITY).powi(2)).sqrt()).fold(GRAVITY, f64::max)
+        felt.map(|[x, y, z]| (x * x + y * y + (z + GRAVITY) * (z + GRAVITY)).sqrt()).fold(GRAVITY, f64::max)
     }
 
     /// Whether the thing is tilted less at the end than at the beginning.
