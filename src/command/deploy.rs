@@ -21,7 +21,7 @@ use crate::pipeline::{self, Calibration, Choices, DeployPlan, Gauged, Input, Kee
 use crate::progress::{Kind, Progress};
 use crate::reads::Account;
 use crate::record::{About, Bound, Folder, Gauge, Taken};
-use crate::terminal::{Stream, print};
+use crate::terminal::{Stream, print, step_aside};
 use crate::{Exit, cancel, files, keys};
 
 /// Devices that are left as they are when a person cannot wait.
@@ -42,6 +42,9 @@ pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
 }
 
 fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
+    if args.mode != DeployMode::Dry {
+        step_aside().map_err(|e| format!("cannot write aside: {e}"))?;
+    }
     let (text, read) = Account::of(|| files::read(&args.subject.file));
     let input = Input::file(&args.subject.file, text?);
     let bindings = String::from_utf8(files::read(&args.bind)?)

@@ -1,6 +1,6 @@
 //! Lines that several devices share: a port is opened once, and each device speaks over it in its turn.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
 use std::rc::{Rc, Weak};
@@ -17,6 +17,7 @@ type Wire = RefCell<Option<Box<dyn Port>>>;
 
 /// A world whose ports are opened once each, as long as somebody uses them.
 pub struct Shared {
+    clock: Rc<Clock>,
     world: Rc<dyn World>,
     open: RefCell<BTreeMap<String, Weak<Wire>>>,
 }
@@ -24,7 +25,30 @@ pub struct Shared {
 impl Shared {
     /// The same world with shared ports.
     pub fn new(world: Rc<dyn World>) -> Self {
-        Shared { world, open: RefCell::default() }
+        let clock = Rc::new(Clock { world: Rc::clone(&world), held_up: Cell::default() });
+        Shared { clock, world, open: RefCell::default() }
+    }
+}
+
+/// Shorter than this a busy machine may always hold a process up.
+const HELD_UP: Duration = Duration::from_secs(2);
+
+/// Measures how long waits last that are bounded.
+struct Clock {
+    world: Rc<dyn World>,
+    held_up: Cell<Duration>,
+}
+
+impl Clock {
+    /// Does what takes so long at most, unless this process is held up.
+    fn within<T>(&self, most: Duration, act: impl FnOnce() -> T) -> T {
+        let begun = self.world.elapsed();
+        let done = act();
+        let beyond = self.world.elapsed().saturating_sub(begun).saturating_sub(most);
+        if beyond >= HELD_UP {
+            self.held_up.set(self.held_up.get() + beyond);
+        }
+        done
     }
 }
 
@@ -38,7 +62,11 @@ impl World for Shared {
     }
 
     fn sleep(&self, time: Duration) {
-        self.world.sleep(time);
+        self.clock.within(time, || self.world.sleep(time));
+    }
+
+    fn held_up(&self) -> Duration {
+        self.clock.held_up.take()
     }
 
     fn open(&self, place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>> {
@@ -49,12 +77,15 @@ impl World for Shared {
             *wire.borrow_mut() = Some(self.world.open(place, driver)?);
             self.open.borrow_mut().insert(at.clone(), Rc::downgrade(&wire));
         }
-        Ok(Box::new(Tap(wire)))
+        Ok(Box::new(Tap { wire, clock: Rc::clone(&self.clock) }))
     }
 }
 
 /// One device's share of a port.
-struct Tap(Rc<Wire>);
+struct Tap {
+    wire: Rc<Wire>,
+    clock: Rc<Clock>,
+}
 
 impl Tap {
     fn over<T>(&self, act: impl FnOnce(&mut dyn Port) -> io::Result<T>) -> io::Result<T> {
@@ -147,6 +178,39 @@ mod tests {
             calls: Vec::new(),
             served: Vec::new(),
             span: matterix_ir::Span::default(),
+        }
+    }
+
+    /// A machine on which each wait takes this much longer than it should.
+    struct Slow(Duration, Cell<Duration>);
+
+    impl World for Slow {
+        fn elapsed(&self) -> Duration {
+            self.1.get()
+        }
+
+        fn wall(&self) -> f64 {
+            0.0
+        }
+
+        fn sleep(&self, time: Duration) {
+            self.1.set(self.1.get() + time + self.0);
+        }
+
+        fn open(&self, _: &Place, _: &Driver) -> io::Result<Box<dyn Port>> {
+            Err(io::Error::other("nobody is there"))
+        }
+    }
+
+    #[test]
+    fn a_process_that_was_held_up_is_known_for_one() {
+        let nap = Duration::from_millis(10);
+        for (beyond, told) in
+            [(Duration::from_secs(1), Duration::ZERO), (Duration::from_secs(9), Duration::from_secs(9))]
+        {
+            let shared = Shared::new(Rc::new(Slow(beyond, Cell::default())));
+            shared.sleep(nap);
+            assert_eq!((shared.held_up(), shared.held_up()), (told, Duration::ZERO));
         }
     }
 

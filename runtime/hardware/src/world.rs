@@ -21,6 +21,12 @@ pub trait World {
 
     /// Opens a port; an error where nobody is there.
     fn open(&self, place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>>;
+
+    /// How much longer than asked for this process was kept waiting since this was last asked: it was stopped, or the machine was
+    /// asleep or busy.
+    fn held_up(&self) -> Duration {
+        Duration::ZERO
+    }
 }
 
 /// Time since the machine was started. What the standard library offers stands still on some machines while they sleep, and

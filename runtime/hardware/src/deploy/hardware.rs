@@ -146,6 +146,10 @@ pub struct Hardware<'m, 't> {
     pub(super) waits: u64,
     /// Limits that broke while the lab caught up with the clock, and that nobody has been told of.
     pub(super) broken_meanwhile: Vec<u32>,
+    /// Where each device was bound when that was last noted, by its name.
+    pub(super) places: BTreeMap<String, String>,
+    /// When this process was held up, s of lab time, and for how long, s by the clock.
+    pub(super) held_up: Vec<(f64, f64)>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
     pub(super) caught_up: Option<f64>,
 }
@@ -207,6 +211,8 @@ impl<'m, 't> Hardware<'m, 't> {
             noted: None,
             waits: 0,
             broken_meanwhile: Vec::new(),
+            places: BTreeMap::new(),
+            held_up: Vec::new(),
             caught_up: None,
         }
     }

@@ -51,6 +51,10 @@ impl Hardware<'_, '_> {
                 | Entry::End { .. } => {
                     self.replay.pop_front();
                 }
+                Entry::HeldUp { t, seconds } => {
+                    self.held_up.push((*t, *seconds));
+                    self.replay.pop_front();
+                }
                 other => return Some(other.clone()),
             }
         }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the form.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// One line. Times are seconds of lab time, walls seconds since 1970.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,6 +50,13 @@ pub enum Entry {
         t: f64,
         /// s.
         to: f64,
+    },
+    /// This process was held up: what was due meanwhile is late.
+    HeldUp {
+        /// s.
+        t: f64,
+        /// By the clock, s.
+        seconds: f64,
     },
     /// Something began or ended while the lab was behind the clock: it did so at this time.
     Late {
@@ -278,6 +285,7 @@ impl Entry {
             Entry::Opened { t, .. }
             | Entry::Clock { t, .. }
             | Entry::Leap { t, .. }
+            | Entry::HeldUp { t, .. }
             | Entry::Late { t, .. }
             | Entry::Starting { t, .. }
             | Entry::Started { t, .. }
