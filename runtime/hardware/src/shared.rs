@@ -8,12 +8,17 @@ use std::time::Duration;
 
 use matterix_ir::wire::Driver;
 
+use crate::debt::Debt;
 use crate::place::Place;
 use crate::port::Port;
 use crate::world::World;
 
 /// A port that is open; none once it has failed, for all of its devices.
-type Wire = RefCell<Option<Box<dyn Port>>>;
+#[derive(Default)]
+struct Wire {
+    port: RefCell<Option<Box<dyn Port>>>,
+    debt: Rc<Debt>,
+}
 
 /// A world whose ports are opened once each, as long as somebody uses them.
 pub struct Shared {
@@ -73,8 +78,8 @@ impl World for Shared {
         let (Place::Serial(at) | Place::Tcp(at)) = place else { return self.world.open(place, driver) };
         let known = self.open.borrow().get(at).and_then(Weak::upgrade);
         let wire = known.unwrap_or_default();
-        if wire.borrow().is_none() {
-            *wire.borrow_mut() = Some(self.world.open(place, driver)?);
+        if wire.port.borrow().is_none() {
+            *wire.port.borrow_mut() = Some(self.world.open(place, driver)?);
             self.open.borrow_mut().insert(at.clone(), Rc::downgrade(&wire));
         }
         Ok(Box::new(Tap { wire, clock: Rc::clone(&self.clock) }))
@@ -89,7 +94,7 @@ struct Tap {
 
 impl Tap {
     fn over<T>(&self, act: impl FnOnce(&mut dyn Port) -> io::Result<T>) -> io::Result<T> {
-        let mut wire = self.0.borrow_mut();
+        let mut wire = self.wire.port.borrow_mut();
         let port = wire.as_deref_mut();
         let port = port.ok_or_else(|| io::Error::new(ErrorKind::NotConnected, "it has failed before"))?;
         let done = act(port);
@@ -106,7 +111,11 @@ impl Port for Tap {
     }
 
     fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>> {
-        self.over(|port| port.receive(within))
+        self.clock.within(within, || self.over(|port| port.receive(within)))
+    }
+
+    fn debt(&self) -> Rc<Debt> {
+        Rc::clone(&self.wire.debt)
     }
 
     fn attach(&mut self, name: &str, bytes: Vec<u8>) -> io::Result<()> {

@@ -249,7 +249,8 @@ impl Hardware<'_, '_> {
         let line = &self.devices[self.line_of(index)];
         match &line.binding.carrier {
             Carrier::Line { place: Place::Serial(_) | Place::Tcp(_), .. } if self.speaks() => {
-                1 + line.owed.min(MOST_OWED)
+                let owed = line.owed + line.link.as_ref().map_or(0, |link| link.owed());
+                1 + owed.min(MOST_OWED)
             }
             _ => 1,
         }
