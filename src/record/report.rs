@@ -385,6 +385,7 @@ impl Report {
                 (self.status, self.ended, self.lab_time) = (status.clone(), moment(*wall), *t);
             }
             Entry::Ended { .. }
+            | Entry::Bound { .. }
             | Entry::Opened { .. }
             | Entry::Clock { .. }
             | Entry::Out { .. }

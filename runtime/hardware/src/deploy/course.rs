@@ -19,6 +19,7 @@ use super::device::{Binding, Carrier, Device};
 use super::exposed::Exposed;
 use super::hardware::{Hardware, Mode, Settings, Unreached};
 use super::journal::{Entry, Journal, VERSION, digest};
+use super::moved::{mixed_up, places};
 use super::preflight::preflight;
 use crate::binding;
 use crate::link::DeviceError;
@@ -131,7 +132,10 @@ pub fn carry_out(
                 true => {
                     Some(refused(at, "the devices of this journal were made safe when it could not be gone on with"))
                 }
-                false => unfit(at, &before, &digest, (speed, seed)),
+                false => unfit(at, &before, &digest, (speed, seed)).or_else(|| {
+                    let why = mixed_up(&places(&before), devices.as_deref().unwrap_or_default())?;
+                    Some(refused(at, &format!("{why}: nobody can tell which of them is which")))
+                }),
             };
             let unfit = unfit.filter(|_| mode != Mode::Replay);
             (journal, Some(before), unfit)

@@ -10,6 +10,7 @@ mod device;
 mod exposed;
 mod hardware;
 mod journal;
+mod moved;
 mod observe;
 mod pace;
 mod people;

@@ -47,6 +47,7 @@ impl Hardware<'_, '_> {
                 | Entry::Back { .. }
                 | Entry::Again { .. }
                 | Entry::Begin { .. }
+                | Entry::Bound { .. }
                 | Entry::Safe { .. }
                 | Entry::End { .. } => {
                     self.replay.pop_front();

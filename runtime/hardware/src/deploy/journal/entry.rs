@@ -30,6 +30,15 @@ pub enum Entry {
         /// Who started it.
         who: String,
     },
+    /// Where a device is bound from here on.
+    Bound {
+        /// s.
+        t: f64,
+        /// Its name.
+        device: String,
+        /// As the bindings have it.
+        place: String,
+    },
     /// All lines are open, and what drivers say then has been said.
     Opened {
         /// s.
@@ -282,7 +291,8 @@ impl Entry {
     pub fn time(&self) -> f64 {
         match self {
             Entry::Begin { .. } => 0.0,
-            Entry::Opened { t, .. }
+            Entry::Bound { t, .. }
+            | Entry::Opened { t, .. }
             | Entry::Clock { t, .. }
             | Entry::Leap { t, .. }
             | Entry::HeldUp { t, .. }
