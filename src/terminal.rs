@@ -45,11 +45,13 @@ const LAST: Duration = Duration::from_secs(1);
 
 /// From here on nothing that is written waits for a reader: a terminal that was told to stand still, or a pipe that nobody reads,
 /// would hold up who feeds watchdogs and heeds a stop.
-pub fn step_aside() -> io::Result<()> {
+pub fn step_aside() -> Result<(), String> {
     let [out, err] = &WAITING;
     let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
-    named("standard output").spawn(|| out.serve(pour_now))?;
-    named("standard error").spawn(|| err.serve(|text| drop(write(io::stderr().lock(), text))))?;
+    let begun = named("standard output")
+        .spawn(|| out.serve(pour_now))
+        .and_then(|_| named("standard error").spawn(|| err.serve(|text| drop(write(io::stderr().lock(), text)))));
+    begun.map_err(|e| format!("cannot write aside: {e}"))?;
     IS_ASIDE.store(true, Ordering::SeqCst);
     // A thread that breaks down would wait for the reader before anybody hears of it.
     std::panic::set_hook(Box::new(|panic| print(Stream::Err, &format!("{panic}\n"))));
@@ -64,7 +66,7 @@ pub fn finish() {
     let left_out: u64 = WAITING.iter().map(|stream| stream.drained(LAST)).sum();
     if left_out > 0 {
         let lines = if left_out == 1 { "1 line was".to_owned() } else { format!("{left_out} lines were") };
-        print(Stream::Err, &format!("{lines} left out here, as nobody read them: the journal has what was done\n"));
+        print(Stream::Err, &format!("{lines} left out here, as nobody read them; a journal has what was done\n"));
         WAITING[1].drained(LAST);
     }
 }

@@ -43,7 +43,7 @@ pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
 
 fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if args.mode != DeployMode::Dry {
-        step_aside().map_err(|e| format!("cannot write aside: {e}"))?;
+        step_aside()?;
     }
     let (text, read) = Account::of(|| files::read(&args.subject.file));
     let input = Input::file(&args.subject.file, text?);

@@ -101,7 +101,7 @@ fn what_a_person_did_not_read_is_counted() {
     let ended = process.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(0), "{said}");
-    assert!(said.contains("left out here, as nobody read them: the journal has what was done"), "{said}");
+    assert!(said.contains("left out here, as nobody read them; a journal has what was done"), "{said}");
 }
 
 #[test]
