@@ -30,7 +30,8 @@ pub struct Shared {
 impl Shared {
     /// The same world with shared ports.
     pub fn new(world: Rc<dyn World>) -> Self {
-        let clock = Rc::new(Clock { world: Rc::clone(&world), held_up: Cell::default() });
+        let seen = Cell::new(world.elapsed());
+        let clock = Rc::new(Clock { world: Rc::clone(&world), seen, held_up: Cell::default() });
         Shared { clock, world, open: RefCell::default() }
     }
 }
@@ -38,22 +39,30 @@ impl Shared {
 /// Shorter than this a busy machine may always hold a process up.
 const HELD_UP: Duration = Duration::from_secs(2);
 
-/// Measures how long waits last that are bounded.
+/// Measures how long waits last that are bounded, and what is between them.
 struct Clock {
     world: Rc<dyn World>,
+    /// When it was last seen that this process goes on.
+    seen: Cell<Duration>,
     held_up: Cell<Duration>,
 }
 
 impl Clock {
     /// Does what takes so long at most, unless this process is held up.
     fn within<T>(&self, most: Duration, act: impl FnOnce() -> T) -> T {
-        let begun = self.world.elapsed();
+        self.goes_on(Duration::ZERO);
         let done = act();
-        let beyond = self.world.elapsed().saturating_sub(begun).saturating_sub(most);
+        self.goes_on(most);
+        done
+    }
+
+    /// It goes on now, and so long of what has passed since it was last seen was asked for.
+    fn goes_on(&self, asked: Duration) {
+        let now = self.world.elapsed();
+        let beyond = now.saturating_sub(self.seen.replace(now)).saturating_sub(asked);
         if beyond >= HELD_UP {
             self.held_up.set(self.held_up.get() + beyond);
         }
-        done
     }
 }
 
@@ -71,7 +80,12 @@ impl World for Shared {
     }
 
     fn held_up(&self) -> Duration {
+        self.clock.goes_on(Duration::ZERO);
         self.clock.held_up.take()
+    }
+
+    fn excuse(&self) {
+        self.clock.seen.set(self.world.elapsed());
     }
 
     fn open(&self, place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>> {
@@ -107,7 +121,11 @@ impl Tap {
 
 impl Port for Tap {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.over(|port| port.send(bytes))
+        self.clock.goes_on(Duration::ZERO);
+        let sent = self.over(|port| port.send(bytes));
+        // Who takes bytes in slowly is a device.
+        self.clock.seen.set(self.clock.world.elapsed());
+        sent
     }
 
     fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>> {
@@ -220,6 +238,12 @@ mod tests {
             let shared = Shared::new(Rc::new(Slow(beyond, Cell::default())));
             shared.sleep(nap);
             assert_eq!((shared.held_up(), shared.held_up()), (told, Duration::ZERO));
+            // Between two waits, and with a device that takes its time.
+            shared.world.sleep(nap);
+            assert_eq!(shared.held_up() > Duration::ZERO, told > Duration::ZERO);
+            shared.world.sleep(nap);
+            shared.excuse();
+            assert_eq!(shared.held_up(), Duration::ZERO);
         }
     }
 
