@@ -14,6 +14,8 @@ pub struct Debt {
     since: Cell<Duration>,
     /// The longest that an answer may have taken so far.
     slowest: Cell<Duration>,
+    /// An answer has come since the first of those was put.
+    has_come: Cell<bool>,
     /// When something went over the wire last, one way or the other.
     stirred: Cell<Duration>,
 }
@@ -28,6 +30,7 @@ impl Debt {
     pub fn owes(&self, asked: &str, put: Duration) {
         if self.answers.get() == 0 {
             self.since.set(put);
+            self.has_come.set(false);
         }
         self.answers.set(self.answers.get() + 1);
         asked.clone_into(&mut self.asked.borrow_mut());
@@ -46,6 +49,7 @@ impl Debt {
     /// An answer has come now, which may be to the first of what was asked.
     pub fn heard(&self, now: Duration) {
         if self.answers.get() > 0 {
+            self.has_come.set(true);
             self.slowest.set(self.slowest.get().max(now.saturating_sub(self.since.get())));
         }
     }
@@ -60,15 +64,16 @@ impl Debt {
         self.stirred.set(now);
     }
 
-    /// Whether nothing more is taken to come, for a device that has so long for an answer; what was lost is never answered. It is silent for
-    /// twice as long as that, and for as long as any answer may have taken.
+    /// Whether nothing more is taken to come, for a device that has so long for an answer; what was lost is never answered.
     pub fn is_over(&self, timeout: Duration, now: Duration) -> bool {
         now.saturating_sub(self.stirred.get()) >= self.silence(timeout)
     }
 
-    /// How long the wire must be silent for that.
+    /// How long the wire must be silent for that: as long as any answer may have taken, and twice as long as an answer may take where none
+    /// has come that would show how slow the device is.
     pub fn silence(&self, timeout: Duration) -> Duration {
-        timeout.saturating_mul(2).max(self.slowest.get())
+        let least = if self.has_come.get() { timeout } else { timeout.saturating_mul(2) };
+        least.max(self.slowest.get())
     }
 
     /// Nothing more is owed.
@@ -90,6 +95,7 @@ mod tests {
             debt.owes("T?", at(put));
         }
         assert!(debt.is_for("T?") && !debt.is_for("L?"));
+        assert_eq!(debt.silence(at(1000)), at(2000));
         debt.stirs(at(5100));
         debt.heard(at(5100));
         debt.paid();
