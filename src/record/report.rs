@@ -386,6 +386,7 @@ impl Report {
             }
             Entry::Ended { .. }
             | Entry::Bound { .. }
+            | Entry::Looked { .. }
             | Entry::Opened { .. }
             | Entry::Clock { .. }
             | Entry::Out { .. }

@@ -206,6 +206,45 @@ fn a_balance_that_is_not_steady_is_asked_again_and_then_given_up() {
     }
 }
 
+/// A heater that tells whether it is on, and is left alone for longer than it stays so.
+const LAZY: &str = "mtx 1
+capability Hot { state active: Bool = false { counts_as: running }
+    command warm effect active = true
+    command cool effect active = false }
+asset Box: Hot { }
+driver BoxLine for Box over tcp(framing: lf, timeout: 1 s) {
+    warm sends \"ON\" expects \"OK\"
+    cool sends \"OFF\" expects \"OK\"
+    reading active asks \"A?\" expects \"{1 = true | 0 = false}\"
+    safe sends \"SAFE\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, box = Box }
+workflow warm_it in bench {
+    warm box
+    wait 13 s
+    cool box
+} finally { cool box; wait 11 s }
+";
+
+#[test]
+fn a_device_that_switches_itself_off_while_a_plan_waits_is_noticed() {
+    let asked = AtomicUsize::new(0);
+    let device = Device::start(b'\n', move |line, _| match line {
+        "A?" => Answer::Says(if asked.fetch_add(1, Ordering::SeqCst) == 0 { "1\n" } else { "0\n" }),
+        _ => Answer::Says("OK\n"),
+    });
+    let dir = bench("reads_lazy", LAZY, "box", &device.address);
+    let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--record", "record"];
+    let ended = crate::harness::matterixc_in(&dir, &given);
+    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && said.contains("error[diverged]"), "{said}");
+    assert!(said.contains("`box.active` is false on the device, not true as it was told"), "{said}");
+    assert!(!said.contains("finally"), "it is carried out whole: {said}");
+    assert_eq!(device.heard().iter().filter(|line| *line == "OFF").count(), 1, "{:?}", device.heard());
+    let record = crate::harness::matterixc_in(&dir, &["verify", "record"]);
+    assert_eq!(record.code, 0, "{}{}", record.out, record.err);
+}
+
 /// A box that tells two plain numbers.
 const BOX: &str = "mtx 1
 capability Tells { reading temperature: Temperature = 25 degC

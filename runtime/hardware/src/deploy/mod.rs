@@ -3,6 +3,7 @@
 mod abreast;
 mod alive;
 mod backend;
+mod between;
 mod calls;
 mod control;
 mod course;

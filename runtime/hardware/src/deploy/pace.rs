@@ -44,6 +44,9 @@ impl Hardware<'_, '_> {
             if self.heeded(is_live) {
                 return Ok(Advance::Watch(Vec::new()));
             }
+            if !is_live {
+                self.looked_before()?;
+            }
             let now = self.twin.now();
             let target = match self.leap(is_live, until) {
                 Some(to) => to,
@@ -53,6 +56,7 @@ impl Hardware<'_, '_> {
                 self.hold()?;
             }
             if is_live && !self.is_dry() && target > self.clock() {
+                self.look_between()?;
                 let left = Duration::try_from_secs_f64((target - self.clock()) / self.settings.speed);
                 self.settings.world.sleep(left.unwrap_or(NAP).clamp(LEAST, NAP));
                 continue;

@@ -60,6 +60,11 @@ pub enum Entry {
         /// s.
         to: f64,
     },
+    /// Devices were asked in between whether they still are as they were told to be, and that came to a fault.
+    Looked {
+        /// s.
+        t: f64,
+    },
     /// This process was held up: what was due meanwhile is late.
     HeldUp {
         /// s.
@@ -295,6 +300,7 @@ impl Entry {
             | Entry::Opened { t, .. }
             | Entry::Clock { t, .. }
             | Entry::Leap { t, .. }
+            | Entry::Looked { t }
             | Entry::HeldUp { t, .. }
             | Entry::Late { t, .. }
             | Entry::Starting { t, .. }
