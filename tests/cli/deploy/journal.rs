@@ -389,6 +389,21 @@ fn a_journal_that_nothing_is_known_of_is_vouched_for() {
 }
 
 #[test]
+fn where_nothing_can_be_kept_beside_a_journal_nothing_is_sent() {
+    let device = super::Device::start(b'\n', |line, _| super::faulty::plate(line));
+    let dir = bench("no_state", HEAT, "plate", &device.address);
+    let deployed = || command().current_dir(&dir).env_remove("XDG_STATE_HOME").env_remove("HOME").args(DEPLOY).output();
+    for _ in 0..2 {
+        let ended = deployed().expect("the command starts");
+        let said = String::from_utf8_lossy(&ended.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(ended.status.code(), Some(1), "{said}");
+        assert!(said.contains("its counterfoil: there is no folder for it"), "{said}");
+        assert!(device.heard().is_empty(), "{:?}", device.heard());
+        assert!(!dir.join("journal").exists(), "another attempt finds none");
+    }
+}
+
+#[test]
 fn a_journal_that_is_cut_or_replaced_meanwhile_ends_the_deployment_and_cannot_be_gone_on_with() {
     for name in ["cut", "replaced"] {
         let dir = bench(&format!("meanwhile_{name}"), &text(), "plate", "");

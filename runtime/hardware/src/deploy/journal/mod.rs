@@ -228,11 +228,21 @@ impl Journal {
 
     /// Writes a line and waits until it is on disk.
     pub fn keep(&mut self, entry: &Entry) -> Result<(), String> {
+        // Before the first line: without it nothing is written, and another attempt finds no journal.
+        if let (Foil::Due, None) = (&self.foil, &self.broken) {
+            match Counterfoil::create(&self.chain.id) {
+                Ok(foil) => self.foil = Foil::Kept(foil),
+                Err(e) => self.broken = Some(format!("its counterfoil: {e}")),
+            }
+        }
         self.note(entry);
         if let (Some(paper), None) = (&mut self.paper, &self.broken) {
             self.broken = paper.sync().err().map(|e| e.to_string());
         }
-        if self.broken.is_none() {
+        // A copy without what came of the last command, or of a question, says that again which may be said twice, or is refused.
+        let follows =
+            matches!(entry, Entry::Started { .. } | Entry::Ended { .. } | Entry::Asked { .. } | Entry::Answered { .. });
+        if self.broken.is_none() && !follows {
             self.broken = self.mark().err().map(|e| format!("its counterfoil: {e}"));
         }
         match &self.broken {
@@ -240,17 +250,12 @@ impl Journal {
             None => Ok(()),
         }
     }
-}
 
-impl Journal {
     /// Says beside it how far it got, before anything is done that an older copy would not know of.
     fn mark(&mut self) -> std::io::Result<()> {
-        if matches!(self.foil, Foil::Due) {
-            self.foil = Foil::Kept(Counterfoil::create(&self.chain.id)?);
-        }
         match &mut self.foil {
             Foil::Kept(foil) => foil.mark(&self.chain),
-            _ => Ok(()),
+            Foil::Not | Foil::Due => Ok(()),
         }
     }
 }
