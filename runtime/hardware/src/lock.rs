@@ -29,7 +29,13 @@ pub fn take(place: &Place) -> io::Result<Hold> {
     let folder = folder()?;
     let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
     let files = canonical(place).into_iter().map(|name| take_one(&name, &folder, &mut held));
-    files.collect::<io::Result<Vec<_>>>().map(Hold)
+    let mut files = files.collect::<io::Result<Vec<_>>>()?;
+    // Who clears `/tmp` of what is old passes over a folder that is locked. Who does so at this moment leaves what is new.
+    let kept = File::open(&folder)?;
+    if flock(&kept, FlockOperation::NonBlockingLockShared).is_ok() {
+        files.push(Arc::new(kept));
+    }
+    Ok(Hold(files))
 }
 
 fn take_one(name: &str, folder: &Path, held: &mut BTreeMap<PathBuf, Weak<File>>) -> io::Result<Arc<File>> {
