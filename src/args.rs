@@ -386,6 +386,9 @@ pub struct DeployArgs {
     /// Go on with a deployment that was cut off, from its journal.
     #[arg(long)]
     pub resume: bool,
+    /// With `--resume`, vouch that the journal is the newest: nothing on this machine says how far it got.
+    #[arg(long, requires = "resume")]
+    pub vouch: bool,
     /// Serve a page on this machine that shows what goes on, and where people answer, pause, go on and stop; its address is printed.
     #[arg(long)]
     pub view: bool,

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_runtime::record::give_up;
 
-use crate::terminal::{Stream, print};
+use crate::terminal::{Stream, finish, print};
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
 /// Set when a command is to end early.
@@ -46,6 +46,7 @@ fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
             }
             // Files that belong together are all there or none.
             let _given_up = give_up();
+            finish();
             std::process::exit(INTERRUPTED);
         }
         print(Stream::Err, said);

@@ -5,6 +5,7 @@
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 mod args;
+mod aside;
 mod cache;
 mod cancel;
 mod command;
@@ -62,11 +63,14 @@ fn main() -> ExitCode {
     };
     // Every pass over a text goes as deep as its brackets; the deepest that are read need more than a thread's usual stack.
     let worker = std::thread::Builder::new().stack_size(STACK).spawn(move || dispatch(cli));
-    match worker.map(std::thread::JoinHandle::join) {
+    let ended = worker.map(std::thread::JoinHandle::join);
+    terminal::finish();
+    match ended {
         Ok(Ok(exit)) => match terminal::lost() {
             None => exit.into(),
             Some(why) => {
                 terminal::print_error(&format!("cannot write to standard output: {why}"));
+                terminal::finish();
                 Exit::Usage.into()
             }
         },

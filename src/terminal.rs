@@ -2,10 +2,13 @@
 
 use std::io::{self, IsTerminal, Write};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use matterix_ir::hidden::visible;
 
 use crate::args::Color;
+use crate::aside::Aside;
 use crate::report::Look;
 
 /// Width where no terminal tells one.
@@ -31,6 +34,43 @@ pub fn lost() -> Option<&'static str> {
     LOST.get().map(String::as_str)
 }
 
+/// What waits to be written to standard output and standard error, once they are written aside.
+static WAITING: [Aside; 2] = [Aside::new(), Aside::new()];
+
+/// Whether they are.
+static IS_ASIDE: AtomicBool = AtomicBool::new(false);
+
+/// So long what waits for each of them may take to be written at the end.
+const LAST: Duration = Duration::from_secs(1);
+
+/// From here on nothing that is written waits for a reader: a terminal that was told to stand still, or a pipe that nobody reads,
+/// would hold up who feeds watchdogs and heeds a stop.
+pub fn step_aside() -> Result<(), String> {
+    let [out, err] = &WAITING;
+    let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
+    let begun = named("standard output")
+        .spawn(|| out.serve(pour_now))
+        .and_then(|_| named("standard error").spawn(|| err.serve(|text| drop(write(io::stderr().lock(), text)))));
+    begun.map_err(|e| format!("cannot write aside: {e}"))?;
+    IS_ASIDE.store(true, Ordering::SeqCst);
+    // A thread that breaks down would wait for the reader before anybody hears of it.
+    std::panic::set_hook(Box::new(|panic| print(Stream::Err, &format!("{panic}\n"))));
+    Ok(())
+}
+
+/// At the end: what waits is written, as far as somebody reads it within seconds, and it is said how much was left out.
+pub fn finish() {
+    if !IS_ASIDE.load(Ordering::SeqCst) {
+        return;
+    }
+    let left_out: u64 = WAITING.iter().map(|stream| stream.drained(LAST)).sum();
+    if left_out > 0 {
+        let lines = if left_out == 1 { "1 line was".to_owned() } else { format!("{left_out} lines were") };
+        print(Stream::Err, &format!("{lines} left out here, as nobody read them; a journal has what was done\n"));
+        WAITING[1].drained(LAST);
+    }
+}
+
 /// Writes text; a reader that has gone away ends the writing, not the command. What a terminal would obey is written in letters: texts of
 /// files, devices and servers are in it, and none of them may clear a screen or hide a line.
 pub fn print(stream: Stream, text: &str) {
@@ -41,6 +81,7 @@ pub fn print(stream: Stream, text: &str) {
 pub fn paint(stream: Stream, text: &str) {
     match stream {
         Stream::Out => pour(text.as_bytes()),
+        Stream::Err if IS_ASIDE.load(Ordering::SeqCst) => WAITING[1].put(text.as_bytes()),
         // There is nowhere left to say that this failed.
         Stream::Err => drop(write(io::stderr().lock(), text.as_bytes())),
     }
@@ -48,6 +89,10 @@ pub fn paint(stream: Stream, text: &str) {
 
 /// Writes a result that may not be text.
 pub fn pour(bytes: &[u8]) {
+    if IS_ASIDE.load(Ordering::SeqCst) { WAITING[0].put(bytes) } else { pour_now(bytes) }
+}
+
+fn pour_now(bytes: &[u8]) {
     if let Err(why) = write(io::stdout().lock(), bytes)
         && why.kind() != io::ErrorKind::BrokenPipe
     {

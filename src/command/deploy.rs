@@ -8,7 +8,7 @@ use std::time::Duration;
 use matterix_hardware::binding;
 use matterix_hardware::calibration::{self, Calibrated};
 use matterix_hardware::deploy::{
-    Answer, Binding, Carrier, Chain, Control, Entry, Exposed, Gate, Journal, JournalError, Kept, Mode,
+    Answer, Binding, Carrier, Control, Entry, Exposed, Gate, Journal, JournalError, Kept, Mode, is_unused,
 };
 use matterix_hardware::world::Machine;
 use matterix_ir::quantity::show_number;
@@ -21,7 +21,7 @@ use crate::pipeline::{self, Calibration, Choices, DeployPlan, Gauged, Input, Kee
 use crate::progress::{Kind, Progress};
 use crate::reads::Account;
 use crate::record::{About, Bound, Folder, Gauge, Taken};
-use crate::terminal::{Stream, print};
+use crate::terminal::{Stream, print, step_aside};
 use crate::{Exit, cancel, files, keys};
 
 /// Devices that are left as they are when a person cannot wait.
@@ -42,6 +42,9 @@ pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
 }
 
 fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
+    if args.mode != DeployMode::Dry {
+        step_aside()?;
+    }
     let (text, read) = Account::of(|| files::read(&args.subject.file));
     let input = Input::file(&args.subject.file, text?);
     let bindings = String::from_utf8(files::read(&args.bind)?)
@@ -257,7 +260,7 @@ fn journal(path: Option<&Path>, args: &DeployArgs) -> Result<Kept, String> {
     if !args.resume {
         return Journal::create(path).map(Kept::New).map_err(|e| e.text().to_owned());
     }
-    match Journal::reopen(path) {
+    match Journal::reopen(path, args.vouch) {
         Ok((journal, before)) => {
             let gates = before.iter().rev().find_map(|entry| match entry {
                 Entry::Gate { to, .. } => Some(*to),
@@ -302,9 +305,7 @@ pub(super) fn left_exposed() -> String {
 
 /// Removes a new journal into which nothing was written but its head: what was refused beforehand may be tried again with it.
 pub(super) fn forget_empty(journal: &Path) {
-    let head = Chain::default().head().len() as u64;
-    let is_empty = std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() <= head);
-    if is_empty {
+    if is_unused(journal) {
         // It stays where it cannot be removed, which the next attempt says.
         let _ = std::fs::remove_file(journal);
     }

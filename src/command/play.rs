@@ -12,7 +12,7 @@ use matterix_ir::{Diagnostic, codes};
 use super::bill::show;
 use crate::args::Color;
 use crate::pipeline::{self, Input, Options, Wires};
-use crate::terminal::{Stream, print};
+use crate::terminal::{Stream, print, step_aside};
 use crate::{Exit, files};
 
 /// Gives the file to the one device of the bindings whose driver says how.
@@ -50,6 +50,7 @@ pub fn play(
         return Err(format!("{several} has a driver that says how a file is played"));
     };
     let device = &program.scene.get(driver.instance).name;
+    step_aside()?;
     print(Stream::Err, &format!("`{device}` is given `{name}`, {} bytes\n", bytes.len()));
     let sheet = Sheet { name: name.to_owned(), bytes };
     let broken = match played(&program, driver, place, sheet, cancel, &mut Silent) {

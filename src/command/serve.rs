@@ -11,7 +11,7 @@ use matterix_sila_wire::{Door, Users};
 use super::run::Findings;
 use crate::args::{Color, RunFormat, ServeArgs};
 use crate::pipeline::{self, Input, Options, Service, Wires};
-use crate::terminal::{Stream, print};
+use crate::terminal::{Stream, print, step_aside};
 use crate::{Exit, cancel, files};
 
 /// Offers a lab to others until it is interrupted; where it answers is printed first.
@@ -59,6 +59,9 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
         }
     };
     let journal = args.journal.as_deref().map(Journal::create).transpose().map_err(|e| e.text().to_owned())?;
+    if bindings.is_some() {
+        step_aside()?;
+    }
     cancel::last_words(super::deploy::left_exposed);
     cancel::on_interrupt_quietly()?;
     let uuid = match &args.uuid {

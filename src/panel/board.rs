@@ -246,6 +246,7 @@ fn line(entry: &Entry) -> Option<(Kind, String)> {
         Entry::Gate { to: Gate::Step, who, .. } => (Kind::Person, format!("one step, by {who}")),
         Entry::Gate { to: Gate::Go, who, .. } => (Kind::Person, format!("going on, by {who}")),
         Entry::Stop { who, .. } => (Kind::Person, format!("stopped by {who}")),
+        Entry::HeldUp { seconds, .. } => (Kind::Wrong, format!("the deployment stood still for {seconds:.1} s")),
         Entry::Fault { text, .. } => (Kind::Wrong, text.clone()),
         Entry::Safe { device, trouble: None, .. } => (Kind::Plain, format!("{device}: made safe")),
         Entry::Safe { device, trouble: Some(why), .. } => {

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use matterix_hardware::deploy::{Chain, Ending, read, sha256};
+use matterix_hardware::deploy::{Ending, is_unused, read, sha256};
 use serde::{Deserialize, Serialize};
 
 use super::report::{About, Report};
@@ -70,8 +70,7 @@ impl Folder {
 
     /// Removes it again where its journal says nothing: what was refused beforehand may be tried again with it.
     pub fn forget_unused(&self) {
-        let head = Chain::default().head().len() as u64;
-        if std::fs::metadata(self.journal()).is_ok_and(|there| there.len() <= head) {
+        if is_unused(&self.journal()) {
             // It stays where it cannot be removed, which the next attempt says.
             let _ = std::fs::remove_dir_all(&self.dir);
         }

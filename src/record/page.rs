@@ -82,6 +82,8 @@ pub fn page(report: &Report) -> String {
         &["lab time, s", "device", "why"],
         report.again.iter().map(|a| vec![show_number(a.lab_time), a.device.clone(), a.why.clone()]),
     );
+    let held_up = report.held_up.iter().map(|h| [h.lab_time, h.seconds].map(show_number).to_vec());
+    out += &table("Stood still", &["lab time, s", "for, s by the clock"], held_up);
     out += &table(
         "Behind the clock",
         &["times", "altogether, s", "longest, s", "at lab time, s"],

@@ -85,6 +85,8 @@ pub struct Report {
     pub texts: Vec<Text>,
     /// Questions that were put to a device once more.
     pub again: Vec<Again>,
+    /// When the process stood still that carried it out.
+    pub held_up: Vec<HeldUp>,
     /// How far the lab was behind the clock; none where it kept up.
     pub behind: Option<Behind>,
     /// Expectations.
@@ -196,6 +198,15 @@ pub struct Again {
     pub why: String,
 }
 
+/// A time in which the process stood still.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldUp {
+    /// s.
+    pub lab_time: f64,
+    /// By the clock, s.
+    pub seconds: f64,
+}
+
 /// Times that the lab went over at once, because it was behind the clock.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Behind {
@@ -294,6 +305,7 @@ impl Report {
             readings: Vec::new(),
             texts: Vec::new(),
             again: Vec::new(),
+            held_up: Vec::new(),
             behind: None,
             expectations: Vec::new(),
             faults: Vec::new(),
@@ -362,6 +374,7 @@ impl Report {
                 self.again.push(Again { lab_time: *t, device: device.clone(), why: why.clone() });
             }
             Entry::Leap { t, to } | Entry::Late { t, to, .. } => self.leapt(*t, to - t),
+            Entry::HeldUp { t, seconds } => self.held_up.push(HeldUp { lab_time: *t, seconds: *seconds }),
             Entry::Fault { t, code, text, .. } => {
                 self.faults.push(Fault { lab_time: *t, code: code.clone(), text: text.clone() });
             }
@@ -372,6 +385,8 @@ impl Report {
                 (self.status, self.ended, self.lab_time) = (status.clone(), moment(*wall), *t);
             }
             Entry::Ended { .. }
+            | Entry::Bound { .. }
+            | Entry::Looked { .. }
             | Entry::Opened { .. }
             | Entry::Clock { .. }
             | Entry::Out { .. }

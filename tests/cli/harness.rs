@@ -29,10 +29,17 @@ impl Ended {
 
 /// The command with nothing in its environment that changes its output.
 pub fn command() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_matterixc"));
+    in_its_environment(env!("CARGO_BIN_EXE_matterixc"))
+}
+
+/// Another command in the same environment.
+pub fn in_its_environment(program: &str) -> Command {
+    let mut command = Command::new(program);
     command.env_remove("NO_COLOR").stdin(Stdio::null());
     // What was planned by an earlier test is the same for a later one.
     command.env("XDG_CACHE_HOME", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"));
+    // What is kept beside journals.
+    command.env("XDG_STATE_HOME", Path::new(env!("CARGO_TARGET_TMPDIR")).join("state"));
     command
 }
 

@@ -6,6 +6,7 @@
 pub mod binding;
 pub mod calibration;
 pub mod codec;
+pub mod debt;
 pub mod deploy;
 pub mod emulate;
 pub mod http;

@@ -9,6 +9,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{Driver, Pattern, Slot, Told, Transport, Until};
 
 use crate::codec::{Codec, Kept, Reply, shown};
+use crate::debt::Debt;
 use crate::pattern::written;
 use crate::place::{self, Place, SilaServer};
 use crate::port::Port;
@@ -58,6 +59,10 @@ pub trait WireTap {
     /// How long an answer is waited for from now on, where that is less than the driver says: it is to end.
     fn patience(&self) -> Option<Duration> {
         None
+    }
+    /// Whether what is said now must be said, whatever else may still come: it makes a device safe.
+    fn must_speak(&self) -> bool {
+        false
     }
 }
 
@@ -187,8 +192,12 @@ pub struct Link {
     codec: Codec,
     timeout: Duration,
     buffer: Vec<u8>,
-    /// So many frames were not answered in time, and their answers may still come.
-    owed: u32,
+    /// Answers that may still come to what was given up.
+    debt: Rc<Debt>,
+    /// What was asked last, and when it went out.
+    asked: (String, Duration),
+    /// What was asked last is to be asked once more.
+    is_again: bool,
     /// What the device said by itself, by the line of its driver: when, and the value.
     heard: BTreeMap<usize, (Duration, f64)>,
     /// What answers said last that is kept, by its name.
@@ -207,7 +216,58 @@ impl Link {
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
         let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
-        Ok(Link { world, port, codec, timeout, buffer, owed: 0, heard, texts })
+        let (debt, asked, is_again) = (port.debt(), (String::new(), Duration::ZERO), false);
+        Ok(Link { world, port, codec, timeout, buffer, debt, asked, is_again, heard, texts })
+    }
+
+    /// Makes ready to say this. Nothing is said to a device that owes answers but the same once more.
+    fn turn_to(&mut self, text: &str, driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
+        if !(std::mem::take(&mut self.is_again) && self.debt.is_for(text)) {
+            self.collect(driver, ear)?;
+        }
+        text.clone_into(&mut self.asked.0);
+        Ok(())
+    }
+
+    /// Waits until the answers have come that are owed, or the line was silent for so long that they are taken to be lost: one that is
+    /// late would be taken for that to what is said next.
+    fn collect(&mut self, driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
+        let begun = self.world.elapsed();
+        while self.owed() > 0 {
+            self.pick_up(driver);
+            let silence = self.debt.silence(self.timeout);
+            if self.debt.is_over(self.timeout, self.world.elapsed()) {
+                self.debt.forget();
+            }
+            let most = ear.patience().unwrap_or(silence + RESTLESS);
+            if self.owed() > 0 && self.passed(begun) >= most {
+                if ear.must_speak() {
+                    return Ok(());
+                }
+                let (n, seconds) = (self.owed(), silence.as_secs_f64());
+                let what = if n == 1 { "an answer".to_owned() } else { format!("{n} answers") };
+                return Err(DeviceError::Garbled(format!(
+                    "it owes {what} to `{}`, and nothing else is said to it before its line was silent for {} s",
+                    self.debt.asked(),
+                    show_number(seconds)
+                )));
+            }
+            if self.owed() > 0 {
+                self.listen(LOOK, ear)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets go by what has come in answer to what was given up; each answer is one that is owed no more.
+    fn pick_up(&mut self, driver: &Driver) {
+        while let Some(late) = self.codec.take_reply(&mut self.buffer) {
+            if late.as_ref().is_ok_and(|late| self.overheard(late, driver)) {
+                continue;
+            }
+            self.debt.heard(self.world.elapsed());
+            self.debt.paid();
+        }
     }
 
     fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
@@ -222,16 +282,13 @@ impl Link {
                 Err(e) => return Err(DeviceError::Lost(format!("the line is gone: {e}"))),
             }
         }
-        if speaks_up(driver) {
-            // A line that the device has begun by itself goes on.
-            while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
-                if let Ok(reply) = reply {
-                    self.overheard(&reply, driver);
-                }
-            }
-        } else {
+        self.pick_up(driver);
+        // A line that the device has begun by itself goes on.
+        if !speaks_up(driver) {
             self.buffer.clear();
         }
+        self.asked.1 = self.world.elapsed();
+        self.debt.stirs(self.asked.1);
         ear.out(frame);
         self.codec.sent(frame);
         self.port.send(frame).map_err(|e| DeviceError::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
@@ -246,6 +303,7 @@ impl Link {
                 if reply.as_ref().is_ok_and(|reply| self.overheard(reply, driver)) {
                     continue;
                 }
+                self.debt.heard(self.world.elapsed());
                 return reply.map_err(|g| {
                     DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
                 });
@@ -257,11 +315,9 @@ impl Link {
             let left = most.saturating_sub(self.passed(begun));
             if left.is_zero() {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
+                self.debt.owes(&self.asked.0, self.asked.1);
                 return Err(match self.buffer.as_slice() {
-                    [] => {
-                        self.owed += 1;
-                        DeviceError::Silent(format!("it did not answer `{}` within {seconds} s", shown(to)))
-                    }
+                    [] => DeviceError::Silent(format!("it did not answer `{}` within {seconds} s", shown(to))),
                     half => DeviceError::Garbled(format!(
                         "its answer to `{}` broke off after `{}`: nothing more came within {seconds} s",
                         shown(to),
@@ -269,7 +325,7 @@ impl Link {
                     )),
                 });
             }
-            self.listen(left.min(LOOK), ear).inspect_err(|_| self.owed += 1)?;
+            self.listen(left.min(LOOK), ear).inspect_err(|_| self.debt.owes(&self.asked.0, self.asked.1))?;
         }
     }
 
@@ -281,34 +337,30 @@ impl Link {
         })?;
         if !bytes.is_empty() {
             ear.back(&bytes);
+            self.debt.stirs(self.world.elapsed());
         }
         let came = !bytes.is_empty();
         self.buffer.extend(bytes);
         Ok(came)
     }
 
-    /// Waits until nothing has come for a while.
-    fn hush(&mut self, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
+    /// The answer to a question. Where some before it were not answered in time, the first that comes may be to one of those: the last is
+    /// to this one, as far as all come before the line falls silent for a while.
+    fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<Reply, DeviceError> {
+        let mut reply = self.reply(to, driver, ear)?;
         let begun = self.world.elapsed();
         let mut heard = begun;
-        while self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
+        while self.owed() > 0 && self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
             if self.listen(LOOK.min(self.timeout), ear)? {
                 heard = self.world.elapsed();
             }
-        }
-        Ok(())
-    }
-
-    /// The answer to a question. Where the one before was not answered in time, what comes last is: the first may be late.
-    fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<Reply, DeviceError> {
-        let mut reply = self.reply(to, driver, ear)?;
-        if std::mem::take(&mut self.owed) > 0 {
-            self.hush(ear)?;
             while let Some(later) = self.codec.take_reply(&mut self.buffer) {
                 let later = later.map_err(|g| {
                     DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
                 })?;
                 if !self.overheard(&later, driver) {
+                    self.debt.heard(self.world.elapsed());
+                    self.debt.paid();
                     reply = later;
                 }
             }
@@ -402,7 +454,9 @@ impl Line for Link {
     ) -> Result<Vec<f64>, DeviceError> {
         let mut numbers = Vec::new();
         self.speak_for(driver);
-        for (place, frame) in self.codec.say(texts).map_err(DeviceError::Unsaid)?.into_iter().enumerate() {
+        let frames = self.codec.say(texts).map_err(DeviceError::Unsaid)?;
+        self.turn_to(&texts.concat(), driver, ear)?;
+        for (place, frame) in frames.into_iter().enumerate() {
             self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
@@ -418,6 +472,7 @@ impl Line for Link {
     fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
         self.speak_for(driver);
         let frame = self.codec.ask(text).map_err(DeviceError::Unsaid)?;
+        self.turn_to(text, driver, ear)?;
         self.send(&frame, driver, ear)?;
         let reply = self.answer(&frame, driver, ear)?;
         if let Some(refused) = self.refusal(driver, &reply) {
@@ -434,12 +489,15 @@ impl Line for Link {
     }
 
     fn settle(&mut self, driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
-        self.hush(ear)?;
-        while let Some(late) = self.codec.take_reply(&mut self.buffer) {
-            if let Ok(late) = late {
-                self.overheard(&late, driver);
+        self.is_again = true;
+        let begun = self.world.elapsed();
+        let mut heard = begun;
+        while self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
+            if self.listen(LOOK.min(self.timeout), ear)? {
+                heard = self.world.elapsed();
             }
         }
+        self.pick_up(driver);
         self.buffer.clear();
         Ok(())
     }
@@ -453,6 +511,7 @@ impl Line for Link {
     ) -> Result<bool, DeviceError> {
         self.speak_for(driver);
         let frame = self.codec.ask(text).map_err(DeviceError::Unsaid)?;
+        self.turn_to(text, driver, ear)?;
         self.send(&frame, driver, ear)?;
         let reply = self.answer(&frame, driver, ear)?;
         // What is waited for may be what else means a failure: that a run is stopped, where it is to stop.
@@ -492,7 +551,7 @@ impl Line for Link {
     }
 
     fn owed(&self) -> u32 {
-        self.owed
+        if self.codec.keeps_answers_apart() { 0 } else { self.debt.answers() }
     }
 
     fn kept(&self) -> Kept {

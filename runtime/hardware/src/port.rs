@@ -2,11 +2,13 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
+use std::rc::Rc;
 use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Transport};
 use serial2::{CharSize, Parity, SerialPort, Settings, StopBits};
 
+use crate::debt::Debt;
 use crate::http;
 use crate::lock::{self, Hold};
 use crate::place::Place;
@@ -20,6 +22,10 @@ pub trait Port {
     /// Whether each message has a connection of its own, so that the next one may go where one was cut.
     fn renews(&self) -> bool {
         false
+    }
+    /// The answers that are owed over this wire.
+    fn debt(&self) -> Rc<Debt> {
+        Rc::default()
     }
     /// Has a file ready that a message may say is to go with it.
     fn attach(&mut self, _name: &str, _bytes: Vec<u8>) -> io::Result<()> {

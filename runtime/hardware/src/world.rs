@@ -21,6 +21,15 @@ pub trait World {
 
     /// Opens a port; an error where nobody is there.
     fn open(&self, place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>>;
+
+    /// How long this process was held up since this was last asked, beside what it waits for: it was stopped, or the machine was
+    /// asleep or busy.
+    fn held_up(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// What was done until now took its time by right.
+    fn excuse(&self) {}
 }
 
 /// Time since the machine was started. What the standard library offers stands still on some machines while they sleep, and

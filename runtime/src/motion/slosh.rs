@@ -98,13 +98,14 @@ impl Wave {
         let swings = frequency * (1.0 - DAMPING * DAMPING).sqrt();
         let (sin, cos) = sin_cos(swings * dt);
         let fades = exp(-DAMPING * frequency * dt);
-        for k in 0..2 {
-            let off = self.pull[k] - felt[k];
-            let slope = (self.rate[k] + DAMPING * frequency * off) / swings;
+        for ((pull, rate), felt) in self.pull.iter_mut().zip(&mut self.rate).zip(felt) {
+            let off = *pull - felt;
+            let slope = (*rate + DAMPING * frequency * off) / swings;
             let (now, turned) = (off * cos + slope * sin, slope * cos - off * sin);
-            self.pull[k] = felt[k] + fades * now;
-            self.rate[k] = fades * (swings * turned - DAMPING * frequency * now);
+            *pull = felt + fades * now;
+            *rate = fades * (swings * turned - DAMPING * frequency * now);
         }
+    }
     }
 }
 

@@ -328,9 +328,160 @@ fn what_was_half_said_begins_when_it_is_said_once_more() {
     assert!((2.5..6.0).contains(&spins), "12 s at four times the speed of the clock are 3 s: {spins} s");
 }
 
+/// What this machine keeps beside a journal.
+fn counterfoil(journal: &str) -> std::path::PathBuf {
+    let head = journal.split_inclusive('\n').next().unwrap_or_default();
+    let id = Chain::of_head(head.as_bytes()).expect("a head").id;
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("state/matterixc/journals").join(id)
+}
+
+#[test]
+fn an_older_copy_of_a_journal_is_refused_and_the_devices_are_made_safe() {
+    let dir = bench("older", &text(), "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut process = deployed(&dir);
+    until(&dir, "\"started\"", 1);
+    let copy = journal(&dir);
+    let whole = &copy[..=copy.rfind('\n').expect("a line")];
+    until(&dir, "\"started\"", 2);
+    process.kill().expect("it can be killed");
+    process.wait().expect("it ends");
+    write(&dir, "journal", whole);
+    let ended = resumed(&dir, "lab.toml");
+    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && one_line.contains("is an older copy: it has"), "{one_line}");
+    assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
+    // It is known from here on that the plate is off, whichever copy is put there.
+    write(&dir, "journal", whole);
+    let again = resumed(&dir, "lab.toml");
+    assert_eq!(again.code, 1, "{}", again.err);
+}
+
+#[test]
+fn a_copy_from_before_the_end_is_refused_after_it() {
+    let dir = bench("older_end", &text(), "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let process = deployed(&dir);
+    until(&dir, "\"told\"", 3);
+    let copy = journal(&dir);
+    super::stop::signal("-TERM", &process);
+    assert_eq!(process.wait_with_output().expect("it ends").status.code(), Some(1));
+    write(&dir, "journal", &copy[..=copy.rfind('\n').expect("a line")]);
+    let ended = resumed(&dir, "lab.toml");
+    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && one_line.contains("is an older copy: it has"), "{one_line}");
+}
+
+#[test]
+fn a_journal_that_nothing_is_known_of_is_vouched_for() {
+    let (dir, _emulated) = killed_in("vouched", &patient("60 s"));
+    let before = journal(&dir);
+    std::fs::remove_file(counterfoil(&before)).expect("it has one");
+    let ended = resumed(&dir, "lab.toml");
+    assert_eq!(ended.code, 2, "{}", ended.err);
+    assert!(ended.err.contains("has no counterfoil") && ended.err.contains("--resume --vouch"), "{}", ended.err);
+    assert_eq!(journal(&dir), before, "it is left as it is");
+    let ended = matterixc_in(&dir, &[&DEPLOY[..], &["--resume", "--vouch"]].concat());
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(counterfoil(&before).is_file());
+}
+
+#[test]
+fn where_nothing_can_be_kept_beside_a_journal_nothing_is_sent() {
+    let device = super::Device::start(b'\n', |line, _| super::faulty::plate(line));
+    let dir = bench("no_state", HEAT, "plate", &device.address);
+    let deployed = || command().current_dir(&dir).env_remove("XDG_STATE_HOME").env_remove("HOME").args(DEPLOY).output();
+    for _ in 0..2 {
+        let ended = deployed().expect("the command starts");
+        let said = String::from_utf8_lossy(&ended.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(ended.status.code(), Some(1), "{said}");
+        assert!(said.contains("its counterfoil: there is no folder for it"), "{said}");
+        assert!(device.heard().is_empty(), "{:?}", device.heard());
+        assert!(!dir.join("journal").exists(), "another attempt finds none");
+    }
+}
+
+#[test]
+fn a_journal_that_is_cut_or_replaced_meanwhile_ends_the_deployment_and_cannot_be_gone_on_with() {
+    for name in ["cut", "replaced"] {
+        let dir = bench(&format!("meanwhile_{name}"), &text(), "plate", "");
+        let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+        write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+        let mut child = command();
+        child.current_dir(&dir).args(DEPLOY).stdout(Stdio::null()).stderr(Stdio::piped());
+        let process = child.spawn().expect("the command starts");
+        until(&dir, "\"told\"", 3);
+        let copy = journal(&dir);
+        if name == "replaced" {
+            std::fs::remove_file(dir.join("journal")).expect("removed");
+        }
+        write(&dir, "journal", if name == "cut" { "" } else { &copy });
+        let ended = process.wait_with_output().expect("it ends");
+        let said = String::from_utf8_lossy(&ended.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(ended.status.code() == Some(1) && said.contains("the journal cannot be written"), "{name}: {said}");
+        write(&dir, "journal", &copy[..=copy.rfind('\n').expect("a line")]);
+        let again = resumed(&dir, "lab.toml");
+        assert_eq!(again.code, 1, "{name}: {}", again.err);
+        assert!(again.err.contains("journal-mismatch"), "{name}: {}", again.err);
+    }
+}
+
+#[test]
+fn a_journal_that_is_a_pipe_is_refused_at_once() {
+    let dir = bench("pipe", HEAT, "plate", "127.0.0.1:1");
+    let made = std::process::Command::new("mkfifo").arg(dir.join("journal")).status();
+    assert!(made.expect("mkfifo").success());
+    let ended = resumed(&dir, "lab.toml");
+    assert!(ended.code == 2 && ended.err.contains("it is no regular file"), "{}", ended.err);
+}
+
+/// Two plates that are alike.
+const PAIR: &str = "mtx 1
+use std::heating::IkaRetControl
+lab bench {
+    ambient: 22 degC
+    left = IkaRetControl at (0, 0, 0) m
+    right = IkaRetControl at (1, 0, 0) m
+}
+workflow warm in bench {
+    stir left at 300 rpm
+    stir right at 300 rpm
+    wait 60 s
+    stop stirring left
+    stop stirring right
+}
+";
+
+#[test]
+fn plates_that_were_exchanged_or_both_moved_are_not_gone_on_with() {
+    for (name, moved) in [("exchanged", false), ("both_moved", true)] {
+        let [one, other] = [(); 2].map(|()| super::Device::start(b'\n', |line, _| super::faulty::plate(line)));
+        let dir = bench(&format!("pair_{name}"), PAIR, "left", "");
+        let bound = |left: &str, right: &str| format!("[left]\naddress = \"{left}\"\n[right]\naddress = \"{right}\"\n");
+        write(&dir, "lab.toml", bound(&one.address, &other.address));
+        let mut process = deployed(&dir);
+        until(&dir, "\"started\"", 2);
+        process.kill().expect("it can be killed");
+        process.wait().expect("it ends");
+        let doors = [&one, &other].map(|device| super::unreached::Door::at(&device.address));
+        let now = match moved {
+            true => bound(&doors[0].address, &doors[1].address),
+            false => bound(&other.address, &one.address),
+        };
+        write(&dir, "now.toml", now);
+        let ended = resumed(&dir, "now.toml");
+        let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(ended.code == 1 && one_line.contains("nobody can tell which of them is which"), "{name}: {one_line}");
+        assert!(one_line.contains("made safe meanwhile: `left`, `right`"), "{name}: {one_line}");
+    }
+}
+
 /// The same journal with another text, chained anew.
 fn rechained(text: &str) -> String {
-    let mut chain = Chain::default();
+    let head = text.split_inclusive('\n').next().unwrap_or_default();
+    let mut chain = Chain::of_head(head.as_bytes()).expect("a head").begun();
     let mut lines = String::new();
     for line in text.lines().skip(1) {
         let after = line.find("\"after\":\"").expect("each line has a digest") + "\"after\":\"".len();
@@ -352,7 +503,9 @@ fn a_journal_of_another_version_is_refused_and_the_devices_are_made_safe() {
     let tool = format!("\"tool\":\"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(before.contains(&tool), "{before}");
     write(&dir, "journal", rechained(&before.replace(&tool, "\"tool\":\"0.0.1\"")));
-    let ended = resumed(&dir, "lab.toml");
+    // What this machine knows of it is that it was written otherwise.
+    std::fs::remove_file(counterfoil(&before)).expect("it has one");
+    let ended = matterixc_in(&dir, &[&DEPLOY[..], &["--resume", "--vouch"]].concat());
     let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(ended.code, 1, "{one_line}");
     assert!(one_line.contains("written by version 0.0.1 of this program"), "{one_line}");

@@ -99,7 +99,7 @@ workflow warm in bench {
     let device = Device::start(b'\n', |line, _| plate(line));
     let dir = bench("left_full", WAITS, "plate", &device.address);
     let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--record", "record", "--speed", "20"];
-    let mut shell = std::process::Command::new("bash");
+    let mut shell = crate::harness::in_its_environment("bash");
     // A signal would end it where a full disk only fails.
     let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\"";
     shell.current_dir(&dir).args(["-c", limited]).arg(env!("CARGO_BIN_EXE_matterixc")).args(args);

@@ -4,6 +4,7 @@ mod ask;
 mod bindings;
 mod faulty;
 mod framed;
+mod held;
 mod journal;
 mod kills;
 mod late;

@@ -205,3 +205,114 @@ fn a_balance_that_is_not_steady_is_asked_again_and_then_given_up() {
         }
     }
 }
+
+/// A heater that tells whether it is on, and is left alone for longer than it stays so.
+const LAZY: &str = "mtx 1
+capability Hot { state active: Bool = false { counts_as: running }
+    command warm effect active = true
+    command cool effect active = false }
+asset Box: Hot { }
+driver BoxLine for Box over tcp(framing: lf, timeout: 1 s) {
+    warm sends \"ON\" expects \"OK\"
+    cool sends \"OFF\" expects \"OK\"
+    reading active asks \"A?\" expects \"{1 = true | 0 = false}\"
+    safe sends \"SAFE\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, box = Box }
+workflow warm_it in bench {
+    warm box
+    wait 13 s
+    cool box
+} finally { cool box; wait 11 s }
+";
+
+#[test]
+fn a_device_that_switches_itself_off_while_a_plan_waits_is_noticed() {
+    let asked = AtomicUsize::new(0);
+    let device = Device::start(b'\n', move |line, _| match line {
+        "A?" => Answer::Says(if asked.fetch_add(1, Ordering::SeqCst) == 0 { "1\n" } else { "0\n" }),
+        _ => Answer::Says("OK\n"),
+    });
+    let dir = bench("reads_lazy", LAZY, "box", &device.address);
+    let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--record", "record"];
+    let ended = crate::harness::matterixc_in(&dir, &given);
+    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && said.contains("error[diverged]"), "{said}");
+    assert!(said.contains("`box.active` is false on the device, not true as it was told"), "{said}");
+    assert!(!said.contains("finally"), "it is carried out whole: {said}");
+    assert_eq!(device.heard().iter().filter(|line| *line == "OFF").count(), 1, "{:?}", device.heard());
+    let record = crate::harness::matterixc_in(&dir, &["verify", "record"]);
+    assert_eq!(record.code, 0, "{}{}", record.out, record.err);
+}
+
+/// A box that tells two plain numbers.
+const BOX: &str = "mtx 1
+capability Tells { reading temperature: Temperature = 25 degC
+    reading load: Ratio = 300 }
+asset Box: Tells { }
+driver BoxLine for Box over tcp(framing: lf, timeout: 1 s) {
+    reading temperature asks \"T?\" expects \"{degC}\"
+    reading load asks \"L?\" expects \"{}\"
+}
+lab bench { ambient: 22 degC, box = Box }
+workflow look in bench {
+    let t = box.temperature
+    let l = box.load
+    expect t in 24.9 degC .. 25.1 degC
+    expect l in 299 .. 301
+}
+";
+
+/// Deploys on a box that answers its first questions so late, one after the other, and breathes without end where it is restless.
+fn slow(name: &str, lags: &'static [u64], is_restless: bool) -> crate::harness::Ended {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let mut out = stream.try_clone().expect("a stream");
+            let mut asked = BufReader::new(stream).lines();
+            let mut lags = lags.iter();
+            while let Some(Ok(line)) = asked.next() {
+                if let Some(lag) = lags.next() {
+                    std::thread::sleep(std::time::Duration::from_millis(*lag));
+                }
+                let answer = if line == "T?" { "25.0\n" } else { "300\n" };
+                if out.write_all(answer.as_bytes()).is_err() {
+                    break;
+                }
+                let mut breath = out.try_clone().expect("a stream");
+                if is_restless {
+                    std::thread::spawn(move || {
+                        while breath.write_all(b" ").is_ok() {
+                            std::thread::sleep(std::time::Duration::from_millis(300));
+                        }
+                    });
+                    std::thread::sleep(std::time::Duration::from_secs(60));
+                }
+            }
+        }
+    });
+    let dir = bench(&format!("reads_slow_{name}"), BOX, "box", &address);
+    super::deploy_at("1", &dir, &["--mode", "real"])
+}
+
+#[test]
+fn a_late_answer_to_one_question_is_never_that_to_another() {
+    let cases: [(&str, &[u64]); 3] = [("once", &[2100, 1500]), ("long", &[4100, 1200]), ("twice", &[2200, 900])];
+    std::thread::scope(|all| {
+        for (name, lags) in cases {
+            all.spawn(move || {
+                let ended = slow(name, lags, false);
+                assert!(ended.code == 0 && ended.err.contains("2 met"), "{name}: {}", ended.err);
+            });
+        }
+    });
+}
+
+#[test]
+fn a_line_that_owes_an_answer_and_is_never_silent_is_named() {
+    let ended = slow("restless", &[2100, 60_000], true);
+    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && said.contains("error[device-garbled]"), "{said}");
+    assert!(said.contains("it owes an answer to `T?`, and nothing else is said to it before"), "{said}");
+}

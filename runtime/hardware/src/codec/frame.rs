@@ -73,6 +73,12 @@ impl Frame {
         self.frames.carries == Carries::Modbus
     }
 
+    /// Whether each answer says by its number which request it answers.
+    pub(super) fn is_numbered(&self) -> bool {
+        let has_number = |layout: &[Part]| layout.iter().any(|part| matches!(part, Part::Number(_)));
+        has_number(&self.frames.request) && has_number(&self.frames.reply)
+    }
+
     /// Whether messages are any bytes.
     pub(super) fn is_exact(&self) -> bool {
         self.frames.carries != Carries::Text

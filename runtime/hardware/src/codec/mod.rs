@@ -94,6 +94,15 @@ impl Codec {
         }
     }
 
+    /// Whether a late answer is known for one, so that it is not taken for that to a later question.
+    pub fn keeps_answers_apart(&self) -> bool {
+        match self {
+            Codec::Frame(frame) => frame.is_numbered(),
+            Codec::Cavro(_) => false,
+            Codec::Json(_) | Codec::Calls => true,
+        }
+    }
+
     /// How long a line is quiet before something is sent.
     pub fn silence(&self) -> Duration {
         match self {

@@ -5,6 +5,7 @@ use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
 use matterix_ir::plan::Plan;
+use matterix_ir::quantity::show_number;
 use matterix_ir::{Diagnostic, Program, Severity, Sources, Span, codes};
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
@@ -18,6 +19,7 @@ use super::device::{Binding, Carrier, Device};
 use super::exposed::Exposed;
 use super::hardware::{Hardware, Mode, Settings, Unreached};
 use super::journal::{Entry, Journal, VERSION, digest};
+use super::moved::{mixed_up, places};
 use super::preflight::preflight;
 use crate::binding;
 use crate::link::DeviceError;
@@ -130,7 +132,10 @@ pub fn carry_out(
                 true => {
                     Some(refused(at, "the devices of this journal were made safe when it could not be gone on with"))
                 }
-                false => unfit(at, &before, &digest, (speed, seed)),
+                false => unfit(at, &before, &digest, (speed, seed)).or_else(|| {
+                    let why = mixed_up(&places(&before), devices.as_deref().unwrap_or_default())?;
+                    Some(refused(at, &format!("{why}: nobody can tell which of them is which")))
+                }),
             };
             let unfit = unfit.filter(|_| mode != Mode::Replay);
             (journal, Some(before), unfit)
@@ -237,6 +242,8 @@ fn concluded(
             found.insert(0, meanwhile(why, &hardware));
         }
     }
+    hardware.notice_hold_up();
+    found.extend(held_up(program.plan.span(), &hardware.held_up));
     found.extend(hardware.close().err().map(|fault| of_fault(&program.plan, fault)));
     let status = match (well, stopped) {
         _ if hardware.is_refused() => REFUSED,
@@ -387,6 +394,17 @@ fn secured(hardware: &mut Hardware<'_, '_>, exposed: &Exposed) -> Vec<Diagnostic
 fn not_halted((at, why): (Span, String)) -> Diagnostic {
     let headline = format!("a device did not stop when it was told to: {why}");
     Diagnostic::error(codes::DEVICE_REFUSED, at, headline, "bound here")
+}
+
+/// That this process stood still while a plan was carried out, where it did: a wait may have lasted longer than it says.
+fn held_up(at: Span, times: &[(f64, f64)]) -> Option<Diagnostic> {
+    let (from, longest) = times.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let more = if times.len() > 1 { format!(", the longest of {} times", times.len()) } else { String::new() };
+    let (from, longest) = (show_number(from), show_number((longest * 10.0).round() / 10.0));
+    let headline =
+        format!("this program stood still for {longest} s at {from} s of lab time{more}: what was due then was late");
+    let d = Diagnostic::error(codes::DIVERGED, at, headline, "not as long as it says");
+    Some(d.help("it was stopped, or this machine was asleep or busy: the journal says what was done when"))
 }
 
 /// That a device may be hot or moving: where it is bound, and why.

@@ -159,4 +159,8 @@ impl WireTap for Listening<'_, '_> {
             (false, false) => None,
         }
     }
+
+    fn must_speak(&self) -> bool {
+        self.securing
+    }
 }

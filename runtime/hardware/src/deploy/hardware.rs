@@ -146,6 +146,14 @@ pub struct Hardware<'m, 't> {
     pub(super) waits: u64,
     /// Limits that broke while the lab caught up with the clock, and that nobody has been told of.
     pub(super) broken_meanwhile: Vec<u32>,
+    /// Where each device was bound when that was last noted, by its name.
+    pub(super) places: BTreeMap<String, String>,
+    /// When devices were last asked in between whether they are as they were told to be, by the clock that never goes back.
+    pub(super) looked: Duration,
+    /// A device or a line has failed: what else differs follows from that.
+    pub(super) is_troubled: bool,
+    /// When this process was held up, s of lab time, and for how long, s by the clock.
+    pub(super) held_up: Vec<(f64, f64)>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
     pub(super) caught_up: Option<f64>,
 }
@@ -207,6 +215,10 @@ impl<'m, 't> Hardware<'m, 't> {
             noted: None,
             waits: 0,
             broken_meanwhile: Vec::new(),
+            places: BTreeMap::new(),
+            looked: origin.1,
+            is_troubled: false,
+            held_up: Vec::new(),
             caught_up: None,
         }
     }
@@ -317,6 +329,7 @@ impl<'m, 't> Hardware<'m, 't> {
 
     /// A fault that came from outside: whoever replays the journal meets it again.
     pub(super) fn outward(&mut self, fault: Fault) -> Fault {
+        self.is_troubled = true;
         let is_theirs = matches!(
             fault.code,
             codes::DEVICE_LOST | codes::DEVICE_GARBLED | codes::DEVICE_REFUSED | codes::DIVERGED | codes::RUN_FAILED

@@ -3,6 +3,7 @@
 mod abreast;
 mod alive;
 mod backend;
+mod between;
 mod calls;
 mod control;
 mod course;
@@ -10,6 +11,7 @@ mod device;
 mod exposed;
 mod hardware;
 mod journal;
+mod moved;
 mod observe;
 mod pace;
 mod people;
@@ -27,7 +29,7 @@ pub use course::{Course, Ending, Kept, REFUSED, carry_out, not_opened, not_reach
 pub use device::{Binding, Carrier, Device};
 pub use exposed::Exposed;
 pub use hardware::{Hardware, Mode, Settings, Unreached};
-pub use journal::{Chain, Entry, Gate, Journal, JournalError, Paper, Past, VERSION, digest, read, sha256};
+pub use journal::{Chain, Entry, Gate, Journal, JournalError, Paper, Past, VERSION, digest, is_unused, read, sha256};
 pub use preflight::preflight;
 
 /// Told of every frame: lab time in s, the device, whether it goes out, the bytes.

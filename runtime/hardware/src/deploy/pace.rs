@@ -36,10 +36,16 @@ impl Hardware<'_, '_> {
             if is_live && let Some(fault) = self.unwritten() {
                 return Err(fault);
             }
+            if is_live {
+                self.notice_hold_up();
+            }
             // Before people are heeded, so that it stands at the same place where their words are gone through again all at once.
             self.beat(false, out)?;
             if self.heeded(is_live) {
                 return Ok(Advance::Watch(Vec::new()));
+            }
+            if !is_live {
+                self.looked_before()?;
             }
             let now = self.twin.now();
             let target = match self.leap(is_live, until) {
@@ -50,6 +56,7 @@ impl Hardware<'_, '_> {
                 self.hold()?;
             }
             if is_live && !self.is_dry() && target > self.clock() {
+                self.look_between()?;
                 let left = Duration::try_from_secs_f64((target - self.clock()) / self.settings.speed);
                 self.settings.world.sleep(left.unwrap_or(NAP).clamp(LEAST, NAP));
                 continue;
@@ -110,6 +117,21 @@ impl Hardware<'_, '_> {
     fn unwritten(&mut self) -> Option<Fault> {
         let why = self.journal.broken.clone().filter(|_| !std::mem::replace(&mut self.is_unwritten, true))?;
         Some(self.unkept(format!("the journal cannot be written: {why}")))
+    }
+
+    /// Notes that this process was held up, where it was.
+    pub(super) fn notice_hold_up(&mut self) {
+        if !self.is_live() {
+            // What an earlier process noted of itself counts too.
+            self.front();
+            return;
+        }
+        let seconds = self.settings.world.held_up().as_secs_f64();
+        if seconds > 0.0 {
+            let t = self.twin.now();
+            self.journal.note(&Entry::HeldUp { t, seconds });
+            self.held_up.push((t, seconds));
+        }
     }
 
     /// Heeds what people say at this moment, or said to the earlier process; whether that lets something go on or end.

@@ -47,8 +47,13 @@ impl Hardware<'_, '_> {
                 | Entry::Back { .. }
                 | Entry::Again { .. }
                 | Entry::Begin { .. }
+                | Entry::Bound { .. }
                 | Entry::Safe { .. }
                 | Entry::End { .. } => {
+                    self.replay.pop_front();
+                }
+                Entry::HeldUp { t, seconds } => {
+                    self.held_up.push((*t, *seconds));
                     self.replay.pop_front();
                 }
                 other => return Some(other.clone()),

@@ -8,6 +8,7 @@ use matterix_runtime::fault::Fault;
 
 use super::hardware::{Hardware, Mode};
 use super::journal::{Entry, VERSION};
+use super::moved::places;
 use super::preflight::asked_for;
 use crate::link::DeviceError;
 
@@ -20,7 +21,9 @@ impl Hardware<'_, '_> {
         let (digest, workflow, speed) = (digest.to_owned(), self.program.plan.workflow.clone(), self.settings.speed);
         let (tool, pid) = (env!("CARGO_PKG_VERSION").to_owned(), std::process::id());
         let (wall, who) = (self.wall(), who.to_owned());
-        self.keep(&Entry::Begin { version: VERSION, tool, digest, workflow, wall, speed, seed, pid, who })
+        self.keep(&Entry::Begin { version: VERSION, tool, digest, workflow, wall, speed, seed, pid, who })?;
+        self.note_places();
+        Ok(())
     }
 
     /// The last line of a journal.
@@ -53,6 +56,7 @@ impl Hardware<'_, '_> {
             _ => f64::INFINITY,
         };
         self.left_at = self.last_seen(&entries);
+        self.places = places(&entries);
         if self.settings.mode != Mode::Replay {
             self.expose();
         }
@@ -120,6 +124,7 @@ impl Hardware<'_, '_> {
         // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
         let (t, wall, pid, who) = (self.twin.now(), self.wall(), std::process::id(), self.who.clone());
         self.keep(&Entry::Resumed { t, wall, pid, who })?;
+        self.note_places();
         self.answers = 0;
         self.half_said.clear();
         self.ask_again();

@@ -170,7 +170,7 @@ impl Hardware<'_, '_> {
             }
             let why = "its driver has no line `safe`";
             let (t, device, trouble) = (self.twin.now(), name.to_owned(), Some(why.to_owned()));
-            self.journal.note(&Entry::Safe { t, device, trouble });
+            self.note_safe(Entry::Safe { t, device, trouble });
             return Err(named(why, name));
         }
         self.relink(line);
@@ -189,7 +189,7 @@ impl Hardware<'_, '_> {
         let (t, device) = (self.twin.now(), name.to_owned());
         if done != Ok(false) {
             let trouble = done.as_ref().err().map(|trouble| trouble.text().to_owned());
-            self.journal.note(&Entry::Safe { t, device, trouble });
+            self.note_safe(Entry::Safe { t, device, trouble });
         }
         match done {
             Ok(true) => {
@@ -203,6 +203,12 @@ impl Hardware<'_, '_> {
                 Err(named(trouble.text(), name))
             }
         }
+    }
+
+    /// An older copy of the journal does not know that a device was made safe: how far it got is on disk beside it.
+    fn note_safe(&mut self, entry: Entry) {
+        // A journal that cannot be written ends no attempt to make the others safe.
+        let _ = self.journal.keep(&entry);
     }
 
     /// Opens a line anew that was lost.
@@ -249,7 +255,8 @@ impl Hardware<'_, '_> {
         let line = &self.devices[self.line_of(index)];
         match &line.binding.carrier {
             Carrier::Line { place: Place::Serial(_) | Place::Tcp(_), .. } if self.speaks() => {
-                1 + line.owed.min(MOST_OWED)
+                let owed = line.owed + line.link.as_ref().map_or(0, |link| link.owed());
+                1 + owed.min(MOST_OWED)
             }
             _ => 1,
         }

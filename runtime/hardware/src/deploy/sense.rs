@@ -77,7 +77,9 @@ impl Hardware<'_, '_> {
         place: &Place,
         address: Option<&str>,
     ) -> Result<Box<dyn Line>, DeviceError> {
-        let mut link = link::open(&self.settings.world, place, driver, address)?;
+        let opened = link::open(&self.settings.world, place, driver, address);
+        self.settings.world.excuse();
+        let mut link = opened?;
         for (_, device, word, text) in self.kept.iter().filter(|(line, ..)| *line == index) {
             link.keep(*device, word.clone(), text.clone());
         }
@@ -100,6 +102,8 @@ impl Hardware<'_, '_> {
     }
 
     pub(super) fn set_clock(&mut self) {
+        // What has been until now is no part of the lab's time, or is caught up with.
+        self.settings.world.held_up();
         self.origin = (self.twin.now(), self.settings.world.elapsed());
     }
 

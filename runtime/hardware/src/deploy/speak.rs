@@ -160,6 +160,7 @@ impl<'m> Hardware<'m, '_> {
         let (journal, trace) = (&mut self.journal, &mut *self.trace);
         let mut ear = Listening { time, device, journal, trace, cancel, securing, unsaid };
         let done = act(link, driver, &mut ear);
+        self.settings.world.excuse();
         let unsaid = ear.unsaid.take().filter(|_| done.is_err());
         unsaid.iter().flatten().for_each(|entry| self.journal.note(entry));
         done

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the form.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// One line. Times are seconds of lab time, walls seconds since 1970.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,6 +30,15 @@ pub enum Entry {
         /// Who started it.
         who: String,
     },
+    /// Where a device is bound from here on.
+    Bound {
+        /// s.
+        t: f64,
+        /// Its name.
+        device: String,
+        /// As the bindings have it.
+        place: String,
+    },
     /// All lines are open, and what drivers say then has been said.
     Opened {
         /// s.
@@ -50,6 +59,18 @@ pub enum Entry {
         t: f64,
         /// s.
         to: f64,
+    },
+    /// Devices were asked in between whether they still are as they were told to be, and that came to a fault.
+    Looked {
+        /// s.
+        t: f64,
+    },
+    /// This process was held up: what was due meanwhile is late.
+    HeldUp {
+        /// s.
+        t: f64,
+        /// By the clock, s.
+        seconds: f64,
     },
     /// Something began or ended while the lab was behind the clock: it did so at this time.
     Late {
@@ -275,9 +296,12 @@ impl Entry {
     pub fn time(&self) -> f64 {
         match self {
             Entry::Begin { .. } => 0.0,
-            Entry::Opened { t, .. }
+            Entry::Bound { t, .. }
+            | Entry::Opened { t, .. }
             | Entry::Clock { t, .. }
             | Entry::Leap { t, .. }
+            | Entry::Looked { t }
+            | Entry::HeldUp { t, .. }
             | Entry::Late { t, .. }
             | Entry::Starting { t, .. }
             | Entry::Started { t, .. }

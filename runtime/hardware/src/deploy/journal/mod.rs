@@ -2,6 +2,7 @@
 //! digest of the one before, and the head says how many there are, so that a journal that was cut or edited is known for one.
 
 mod chain;
+mod counterfoil;
 mod entry;
 mod paper;
 
@@ -16,6 +17,7 @@ pub use chain::{Chain, sha256};
 pub use entry::{Entry, Gate, Turn, VERSION};
 pub use paper::{Paper, Sheet};
 
+use counterfoil::Counterfoil;
 use paper::Taken;
 
 /// Longest journal that is read, bytes.
@@ -61,10 +63,24 @@ pub type Reader = dyn FnMut(&Entry);
 pub struct Journal {
     paper: Option<Box<dyn Paper>>,
     chain: Chain,
+    /// Whether what it got to is kept beside it too, and where.
+    foil: Foil,
     /// Why nothing more was written.
     pub broken: Option<String>,
     /// Is shown each line as it is written.
     reader: Option<Box<Reader>>,
+}
+
+/// What is kept beside a journal.
+#[derive(Debug, Default)]
+enum Foil {
+    /// Nothing.
+    #[default]
+    Not,
+    /// Something, from the first line on that is kept.
+    Due,
+    /// This.
+    Kept(Counterfoil),
 }
 
 /// A journal that was read.
@@ -94,13 +110,17 @@ impl Journal {
             Taken::Io(e) => JournalError::File(format!("cannot create the journal `{}`: {e}", path.display())),
             Taken::Locked => busy(path),
         })?;
-        Journal::on(Box::new(sheet))
-            .map_err(|e| JournalError::File(format!("cannot write the journal `{}`: {e}", path.display())))
+        let begun = Chain::fresh().and_then(|chain| Journal::begun(Box::new(sheet), chain));
+        let begun = begun.map(|journal| Journal { foil: Foil::Due, ..journal });
+        begun.map_err(|e| JournalError::File(format!("cannot write the journal `{}`: {e}", path.display())))
     }
 
     /// A new one on paper that is empty.
-    pub fn on(mut paper: Box<dyn Paper>) -> std::io::Result<Self> {
-        let chain = Chain::default();
+    pub fn on(paper: Box<dyn Paper>) -> std::io::Result<Self> {
+        Journal::begun(paper, Chain::default())
+    }
+
+    fn begun(mut paper: Box<dyn Paper>, chain: Chain) -> std::io::Result<Self> {
         paper.append(chain.head().as_bytes())?;
         Ok(Journal { paper: Some(paper), chain, ..Journal::default() })
     }
@@ -110,21 +130,46 @@ impl Journal {
         Journal { paper: Some(paper), chain: past.chain.clone(), ..Journal::default() }
     }
 
-    /// One that is gone on with, and what it says so far. A last line that broke off is cut away.
-    pub fn reopen(path: &Path) -> Result<(Self, Vec<Entry>), JournalError> {
+    /// One that is gone on with, and what it says so far. A last line that broke off is cut away. Where nothing beside it says how far
+    /// it got, as on another machine, somebody has to vouch for it.
+    pub fn reopen(path: &Path, is_vouched: bool) -> Result<(Self, Vec<Entry>), JournalError> {
         let wrong = |e: &dyn std::fmt::Display| format!("cannot read the journal `{}`: {e}", path.display());
         let mut sheet = Sheet::open(path).map_err(|taken| match taken {
             Taken::Io(e) => JournalError::File(wrong(&e)),
             Taken::Locked => busy(path),
         })?;
+        let told = sheet.told();
+        let found =
+            told.as_ref().map_or(Ok(None), |chain| Counterfoil::find(&chain.id)).map_err(|taken| match taken {
+                Taken::Io(e) => JournalError::File(wrong(&format!("its counterfoil: {e}"))),
+                Taken::Locked => busy(path),
+            })?;
+        let is_begun = told.is_some_and(|chain| chain.lines > 0);
+        if found.is_none() && is_begun && !is_vouched {
+            let why = "nothing on this machine says how far it got, so that it may be an older copy";
+            let help = "see that it is the newest, and go on with `--resume --vouch`";
+            return Err(JournalError::File(format!(
+                "the journal `{}` has no counterfoil: {why}; {help}",
+                path.display()
+            )));
+        }
+        let (mut foil, known) = match found {
+            Some((foil, known)) => (Foil::Kept(foil), Some(known)),
+            None => (Foil::Due, None),
+        };
         let file = File::open(path).map_err(|e| JournalError::File(wrong(&e)))?;
-        let past = read(BufReader::new(file)).map_err(|why| {
+        let mut past = read_known(BufReader::new(file), known.as_ref()).map_err(|why| {
             // What it was about is made safe now: it stays as it is when somebody mends the file.
             sheet.shut();
+            if let (Foil::Kept(foil), Some(known)) = (&mut foil, &known) {
+                // Nothing is gone on with either where this cannot be said.
+                let _ = foil.mark(&Chain { is_shut: true, ..known.clone() });
+            }
             JournalError::Damaged(format!("the journal `{}` {why}", path.display()))
         })?;
+        past.chain.is_shut |= known.is_some_and(|known| known.is_shut);
         sheet.cut(past.whole).map_err(|e| JournalError::File(wrong(&e)))?;
-        Ok((Journal::after(Box::new(sheet), &past), past.entries))
+        Ok((Journal { foil, ..Journal::after(Box::new(sheet), &past) }, past.entries))
     }
 
     /// Whether one is kept.
@@ -140,6 +185,10 @@ impl Journal {
             // What cannot be written over is not there any more, or cannot be read either.
             let _ = paper.head(self.chain.head().as_bytes()).and_then(|()| paper.sync());
         }
+        if let Foil::Kept(foil) = &mut self.foil {
+            // Where it cannot be said here, the head says it.
+            let _ = foil.mark(&self.chain);
+        }
     }
 
     /// Whether nobody goes on from here.
@@ -149,7 +198,7 @@ impl Journal {
 
     /// Nothing more is written: it is left as it is.
     pub fn seal(&mut self) {
-        self.paper = None;
+        (self.paper, self.foil) = (None, Foil::Not);
     }
 
     /// From here on `reader` is shown each line as it is written, also where writing fails.
@@ -179,13 +228,34 @@ impl Journal {
 
     /// Writes a line and waits until it is on disk.
     pub fn keep(&mut self, entry: &Entry) -> Result<(), String> {
+        // Before the first line: without it nothing is written, and another attempt finds no journal.
+        if let (Foil::Due, None) = (&self.foil, &self.broken) {
+            match Counterfoil::create(&self.chain.id) {
+                Ok(foil) => self.foil = Foil::Kept(foil),
+                Err(e) => self.broken = Some(format!("its counterfoil: {e}")),
+            }
+        }
         self.note(entry);
         if let (Some(paper), None) = (&mut self.paper, &self.broken) {
             self.broken = paper.sync().err().map(|e| e.to_string());
         }
+        // A copy without what came of the last command, or of a question, says that again which may be said twice, or is refused.
+        let follows =
+            matches!(entry, Entry::Started { .. } | Entry::Ended { .. } | Entry::Asked { .. } | Entry::Answered { .. });
+        if self.broken.is_none() && !follows {
+            self.broken = self.mark().err().map(|e| format!("its counterfoil: {e}"));
+        }
         match &self.broken {
             Some(why) => Err(format!("the journal cannot be written: {why}")),
             None => Ok(()),
+        }
+    }
+
+    /// Says beside it how far it got, before anything is done that an older copy would not know of.
+    fn mark(&mut self) -> std::io::Result<()> {
+        match &mut self.foil {
+            Foil::Kept(foil) => foil.mark(&self.chain),
+            Foil::Not | Foil::Due => Ok(()),
         }
     }
 }
@@ -203,8 +273,24 @@ fn busy(path: &Path) -> JournalError {
     JournalError::Busy(format!("{who} is writing the journal `{}`: wait for its end, or stop it first", path.display()))
 }
 
+/// Whether nothing was ever written into a journal but its head.
+pub fn is_unused(path: &Path) -> bool {
+    let length = Chain::default().head().len() as u64;
+    if !std::fs::metadata(path).is_ok_and(|there| there.is_file() && there.len() == length) {
+        return false;
+    }
+    // One that was emptied while it was written says in its head how much there was.
+    let chain = std::fs::read(path).ok().and_then(|text| Chain::of_head(&text));
+    chain.is_some_and(|chain| chain == chain.begun())
+}
+
 /// Reads a journal; why it is not one as it was written, as what is said of it.
 pub fn read(from: impl Read) -> Result<Past, String> {
+    read_known(from, None)
+}
+
+/// Reads a journal of which is known how far it got.
+fn read_known(from: impl Read, known: Option<&Chain>) -> Result<Past, String> {
     let mut reader = BufReader::new(from).take(LONGEST);
     let mut head = Vec::new();
     let is_there = next_line(&mut reader, &mut head)?;
@@ -212,7 +298,7 @@ pub fn read(from: impl Read) -> Result<Past, String> {
         return Err("is empty".to_owned());
     }
     let told = Chain::of_head(&head).filter(|_| is_there).ok_or("does not begin as one")?;
-    let mut past = Past { whole: head.len() as u64, ..Past::default() };
+    let mut past = Past { whole: head.len() as u64, chain: told.begun(), entries: Vec::new() };
     past.chain.is_shut = told.is_shut;
     if told.lines == 0 && told != past.chain {
         return Err("was edited: its head is not as it was written".to_owned());
@@ -229,7 +315,8 @@ pub fn read(from: impl Read) -> Result<Past, String> {
         past.chain.grow(text);
         past.whole += line.len() as u64;
         past.entries.push(entry);
-        if past.chain.lines == told.lines && past.chain.last != told.last {
+        let is_other = |then: &Chain| past.chain.lines == then.lines && past.chain.last != then.last;
+        if is_other(&told) || known.is_some_and(is_other) {
             return Err(format!("was edited: line {number} is not as it was written"));
         }
     }
@@ -238,6 +325,12 @@ pub fn read(from: impl Read) -> Result<Past, String> {
     }
     if past.chain.lines < told.lines {
         return Err(format!("was cut short: it has {} lines of {}", past.chain.lines + 1, told.lines + 1));
+    }
+    if let Some(then) = known.filter(|then| past.chain.lines < then.lines) {
+        let (is, was) = (past.chain.lines + 1, then.lines + 1);
+        return Err(format!(
+            "is an older copy: it has {is} lines, and {was} had been written when devices were last told something"
+        ));
     }
     Ok(past)
 }
