@@ -106,7 +106,6 @@ impl Wave {
             *rate = fades * (swings * turned - DAMPING * frequency * now);
         }
     }
-    }
 }
 
 #[cfg(test)]
