@@ -77,7 +77,7 @@ fn a_vessel_is_tilted_as_far_as_closed_forms_say_and_as_fast_as_it_pours() {
     steps.push(asks(PI / 2.0, 0.4e-6));
     steps.push("expect brink(source, 184.6 mL) in 49.8 deg .. 50.2 deg".to_string());
     let text = bench("", "Beaker250mL", "100 mL", "", &steps.join("\n    "));
-    write(&dir, "law.mtx", &text);
+    write(&dir, "law.mtx", text);
     let law = matterixc_in(&dir, &["run", "law.mtx"]);
     assert_eq!(law.code, 0, "{}{}", law.out, law.err);
 }
@@ -93,19 +93,19 @@ const OWN: &str = "extern skill dash(source: Container) into(target: Container) 
 fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
     let dir = folder("spills_own");
     let steps = "pick source by panda\n    dash source into target by panda\n    level source at target by panda\n    put back source by panda";
-    write(&dir, "bench.mtx", &bench("", "Beaker250mL", "200 mL", OWN, steps));
+    write(&dir, "bench.mtx", bench("", "Beaker250mL", "200 mL", OWN, steps));
     let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
     assert_eq!(run.code, 0, "{}{}", run.out, run.err);
     let verdict = matterixc_in(&dir, &["verify", "out"]);
     assert!(verdict.code == 1 && verdict.out.contains("mL run over the rim of `source`"), "{}", verdict.out);
 
     let steps = "pick source by panda\n    lean source at target by panda\n    level source at target by panda\n    put back source by panda";
-    write(&dir, "lean.mtx", &bench("", "Beaker250mL", "200 mL", OWN, steps));
+    write(&dir, "lean.mtx", bench("", "Beaker250mL", "200 mL", OWN, steps));
     let check = matterixc_in(&dir, &["check", "--no-cache", "lean.mtx"]);
     assert!(check.code == 1 && check.out.contains("error[spilled]"), "{}{}", check.out, check.err);
     let run = matterixc_in(&dir, &["run", "lean.mtx", "--fidelity", "motion", "--dry"]);
     assert!(run.code != 101, "{}", run.err);
-    write(&dir, "little.mtx", &bench("", "Beaker250mL", "50 mL", OWN, steps));
+    write(&dir, "little.mtx", bench("", "Beaker250mL", "50 mL", OWN, steps));
     let check = matterixc_in(&dir, &["check", "--no-cache", "little.mtx"]);
     assert_eq!(check.code, 0, "{}{}", check.out, check.err);
 }
@@ -114,10 +114,10 @@ fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
 fn a_stream_that_misses_a_narrow_mouth_is_found_and_a_slow_one_goes_in() {
     let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
     let dir = folder("spills_narrow");
-    write(&dir, "quick.mtx", &bench(", pour_rate: 40 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
+    write(&dir, "quick.mtx", bench(", pour_rate: 40 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
     let quick = matterixc_in(&dir, &["check", "--no-cache", "quick.mtx"]);
     assert!(quick.code == 1 && quick.out.contains("the mouth of `target` is 19 mm wide"), "{}{}", quick.out, quick.err);
-    write(&dir, "slow.mtx", &bench(", pour_rate: 1 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
+    write(&dir, "slow.mtx", bench(", pour_rate: 1 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
     let slow = matterixc_in(&dir, &["check", "--no-cache", "slow.mtx"]);
     assert_eq!(slow.code, 0, "{}{}", slow.out, slow.err);
 }
@@ -135,7 +135,7 @@ fn a_vessel_whose_inside_is_not_known_is_poured_from_as_the_arm_says() {
         "expect kept(source, 30 deg) == unlimited\n    expect brink(source, 1 mL) == unlimited",
     );
     let dir = folder("spills_unknown");
-    write(&dir, "bench.mtx", &text.replace("source = Beaker250mL", "source = Jug"));
+    write(&dir, "bench.mtx", text.replace("source = Beaker250mL", "source = Jug"));
     let run = matterixc(&["run", dir.join("bench.mtx").to_str().expect("a path")]);
     assert_eq!(run.code, 0, "{}{}", run.out, run.err);
 }
@@ -158,7 +158,7 @@ fn a_thing_that_a_grip_barely_bears_is_carried_more_slowly() {
     let (barely, well) = (way("spills_barely", 0.105), way("spills_well", 0.6));
     assert!(barely > 1.5 * well, "{barely} s, {well} s");
     let dir = folder("spills_slips");
-    write(&dir, "bench.mtx", &text(0.09));
+    write(&dir, "bench.mtx", text(0.09));
     let weak = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
     assert!(weak.code == 1 && weak.out.contains("grip-too-weak"), "{}", weak.out);
 }
