@@ -1,6 +1,6 @@
 //! Numbers of the twin that are known in closed form, at every size and however short a time they last.
 
-use crate::harness::{matterixc, pass_cases, root, run_case};
+use crate::harness::{folder, matterixc, matterixc_in, pass_cases, root, run_case, write};
 
 #[test]
 fn states_of_any_size_are_followed() {
@@ -103,4 +103,16 @@ fn what_a_feed_of_microlitres_comes_to_is_known_beforehand() {
     let file = root().join("tests/cases/numerics/sizes.mtx");
     let checked = matterixc(&["check", "--contents", file.to_str().expect("text")]);
     assert!(checked.out.contains("fed 30.5 uL"), "{}{}", checked.out, checked.err);
+}
+
+#[test]
+fn what_is_unlimited_is_more_than_any_number() {
+    let dir = folder("numerics_unlimited");
+    let text = "mtx 1\nconst a: Length? = unlimited\nconst b: Length = 5 m\nlab bench { ambient: 22 degC }\nworkflow w in bench {\n    \
+                expect a > b and a >= b and b < a and b <= a and a != b\n    \
+                expect not (a <= b) and not (a < b) and not (a == b) and not (b > a) and not (b >= a)\n    expect not (a in 1 m .. 2 m)\n    \
+                expect a == a and a <= a and not (a < a)\n}\n";
+    write(&dir, "unlimited.mtx", text);
+    let run = matterixc_in(&dir, &["run", "unlimited.mtx"]);
+    assert_eq!(run.code, 0, "{}{}", run.out, run.err);
 }

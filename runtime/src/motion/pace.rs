@@ -25,6 +25,8 @@ const ROOM: f64 = 2.0;
 const MARGIN: f64 = 1.1;
 /// No wave is steeper than this, rad: beyond it waves break, and the law of small ones says nothing.
 const STEEP: f64 = PI / 6.0;
+/// A vessel that has poured and is set upright by so much, or by half, pours no more, rad.
+const RIGHTED: f64 = 0.15;
 /// A motion is made so many times as long at most.
 const SLOWEST: f64 = 30.0;
 /// How finely it is found how many times.
@@ -56,6 +58,8 @@ struct Ride {
     way: Vec<[f64; 3]>,
     axes: Vec<[f64; 3]>,
     middles: Vec<[f64; 3]>,
+    /// So many places at the beginning are left out of account: what runs out there runs into what was poured into.
+    over: usize,
 }
 
 /// What becomes of a thing while it is moved.
@@ -86,7 +90,9 @@ impl Ride {
         for (index, axis) in self.axes.iter().enumerate() {
             let felt = felt(&self.way, index, dt);
             wave.follow([felt[0], felt[1]], frequency, dt);
-            look(*axis, wave.pull, MARGIN, felt[2]);
+            if index >= self.over {
+                look(*axis, wave.pull, MARGIN, felt[2]);
+            }
         }
         // The wave goes on when the vessel stands, and meets another motion then: that finds half of the room.
         let step = 2.0 * PI / frequency / f64::from(AFTER);
@@ -164,7 +170,7 @@ impl Stage<'_> {
         let Some(Burden { loose, borne }) = self.burdens.get(&held).copied() else { return Ok(performed) };
         let shape = self.scene.get(held).shape.as_ref();
         let filled = shape.zip(loose).and_then(|(shape, volume)| Filled::of(shape, volume));
-        let ride = before.ride(&performed, held, filled.as_ref().map_or(0.0, |filled| filled.surface));
+        let mut ride = before.ride(&performed, held, filled.as_ref().map_or(0.0, |filled| filled.surface));
         let borne = borne.unwrap_or(f64::INFINITY);
         if borne < GRAVITY {
             return Err(Refused::Slips(held, borne));
@@ -176,7 +182,16 @@ impl Stage<'_> {
         if let Some(filled) = &filled {
             let (mut wave, since) = before.waves.get(&held).copied().unwrap_or_default();
             wave.follow([0.0; 2], filled.frequency, (before.now - since).max(0.0));
-            if !pours && !rights {
+            if pours {
+                // It is brought there first; what runs out then does not run into the target.
+                return Ok(self.poured(before, performed, (held, filled, wave), slow));
+            }
+            if rights {
+                let tilts = ride.axes.iter().map(|axis| between(*axis, [0.0, 0.0, 1.0]));
+                let first = tilts.clone().next().unwrap_or_default();
+                ride.over = tilts.take_while(|tilt| *tilt > (first - RIGHTED).max(0.5 * first)).count();
+                pace = filled.calm(&ride, wave, slow);
+            } else {
                 let lost = filled.lost(ride.own_tilt());
                 if lost > 0.0 {
                     return Err(Refused::Spills(held, lost));
@@ -189,6 +204,27 @@ impl Stage<'_> {
         Ok(performed.paced(pace))
     }
 
+    /// A motion whose last part pours, with the parts before it as slow as their contents need.
+    fn poured(
+        &mut self,
+        before: &Stage<'_>,
+        mut performed: Performed,
+        (held, filled, wave): (InstanceId, &Filled, Wave),
+        slow: f64,
+    ) -> Performed {
+        let last = performed.parts.pop();
+        let mut wave = wave;
+        if !performed.parts.is_empty() {
+            let ride = before.ride(&performed, held, filled.surface);
+            let pace = filled.calm(&ride, wave, slow);
+            wave = ride.swing(pace, wave, filled.frequency).wave;
+            performed = performed.paced(pace);
+        }
+        self.waves.insert(held, (wave, before.now + performed.duration()));
+        performed.parts.extend(last);
+        performed
+    }
+
     /// How a thing in hand is moved on a way that begins as things stand now.
     fn ride(&self, performed: &Performed, held: InstanceId, surface: f64) -> Ride {
         let mut stage = self.clone();
@@ -199,8 +235,13 @@ impl Stage<'_> {
         };
         let duration = performed.duration();
         let steps = (duration / APART).ceil().max(1.0) as u32;
-        let mut ride =
-            Ride { apart: duration / f64::from(steps), way: Vec::new(), axes: Vec::new(), middles: Vec::new() };
+        let mut ride = Ride {
+            apart: duration / f64::from(steps),
+            way: Vec::new(),
+            axes: Vec::new(),
+            middles: Vec::new(),
+            over: 0,
+        };
         for step in 0..=steps {
             let since = duration * f64::from(step) / f64::from(steps);
             if let Some(actor) = stage.actors.get_mut(&performed.robot) {
@@ -243,7 +284,7 @@ mod tests {
             let at = |t: f64| if t < half { 0.5 * t * t } else { 0.2 - 0.5 * (2.0 * half - t).max(0.0).powi(2) };
             let steps = (2.0 * half / apart) as usize;
             let way: Vec<[f64; 3]> = (0..=steps).map(|i| [at(i as f64 * apart), 0.0, 0.0]).collect();
-            Ride { apart, axes: vec![[0.0, 0.0, 1.0]; way.len()], middles: Vec::new(), way }
+            Ride { apart, axes: vec![[0.0, 0.0, 1.0]; way.len()], middles: Vec::new(), way, over: 0 }
         };
         let pull = |times: f64, frequency: f64| {
             let ride = line(APART);
@@ -261,7 +302,8 @@ mod tests {
     fn a_ride_pulls_as_much_as_it_is_sped_up() {
         // Up at 2 m/s2: 11.8 m/s2 with gravity; four times as slowly an eighth of a metre per second squared of its own.
         let way: Vec<[f64; 3]> = (0..200).map(|i| [0.0, 0.0, (f64::from(i) * APART).powi(2)]).collect();
-        let ride = Ride { apart: APART, axes: vec![[0.0, 0.0, 1.0]; way.len()], middles: way[..150].to_vec(), way };
+        let ride =
+            Ride { apart: APART, axes: vec![[0.0, 0.0, 1.0]; way.len()], middles: way[..150].to_vec(), way, over: 0 };
         assert!((ride.pull(1.0) - GRAVITY - 2.0).abs() < 1e-6 || ride.pull(1.0) > GRAVITY + 2.0);
         assert_eq!(times(1.0, |times| times < 3.0).round(), 3.0);
         assert_eq!(times(1.0, |_| false), 1.0);

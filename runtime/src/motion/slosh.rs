@@ -17,6 +17,8 @@ pub(super) const GRAVITY: f64 = 9.806_65;
 const FIRST_WAVE: f64 = 1.841_183_781_340_659;
 /// Damping of the first wave as a share of the critical one: about that of water in a smooth vessel of some centimetres.
 const DAMPING: f64 = 0.01;
+/// What counts as little, as a share of what fills the vessel: a film that is no liquid with waves, or the last drops of what pours.
+const LITTLE: f64 = 2e-3;
 /// What may stand above the rim without running out, as a share of what fills the vessel: the error of the table.
 const SLACK: f64 = 1e-3;
 
@@ -40,8 +42,15 @@ impl Filled {
         let depth = surface - inside.first()?[1];
         let steep = 2.0 * FIRST_WAVE * depth / radius;
         let tanh = 1.0 - 2.0 / (exp(steep.min(700.0)) + 1.0);
+        let tilts = table(inside);
         let frequency = (FIRST_WAVE * GRAVITY / radius * tanh).sqrt();
-        Some(Filled { tilts: table(inside), volume, frequency, surface })
+        let filled = Filled { tilts, volume, frequency, surface };
+        Some(filled).filter(|filled| filled.volume > filled.little())
+    }
+
+    /// A volume that does not count, m3.
+    pub(super) fn little(&self) -> f64 {
+        LITTLE * self.tilts.first().map_or(0.0, |p| p[1])
     }
 
     /// How much runs out at a tilt, m3.
