@@ -344,13 +344,18 @@ impl Link {
         Ok(came)
     }
 
+    /// Whether more of what is late may come over a line that is listened to since `begun`, on which something was last heard then.
+    fn may_come(&self, begun: Duration, heard: Duration) -> bool {
+        self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS
+    }
+
     /// The answer to a question. Where some before it were not answered in time, the first that comes may be to one of those: the last is
     /// to this one, as far as all come before the line falls silent for a while.
     fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<Reply, DeviceError> {
         let mut reply = self.reply(to, driver, ear)?;
         let begun = self.world.elapsed();
         let mut heard = begun;
-        while self.owed() > 0 && self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
+        while self.owed() > 0 && self.may_come(begun, heard) {
             if self.listen(LOOK.min(self.timeout), ear)? {
                 heard = self.world.elapsed();
             }
@@ -492,7 +497,7 @@ impl Line for Link {
         self.is_again = true;
         let begun = self.world.elapsed();
         let mut heard = begun;
-        while self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
+        while self.may_come(begun, heard) {
             if self.listen(LOOK.min(self.timeout), ear)? {
                 heard = self.world.elapsed();
             }

@@ -117,9 +117,20 @@ impl Ride {
         height(self.axes.last()) > height(self.axes.first()) + 1e-9
     }
 
+    /// Leaves out of account what runs out before the thing is upright enough to pour no more.
+    fn leave_out_pouring(&mut self) {
+        let first = self.tilts().next().unwrap_or_default();
+        self.over = self.tilts().take_while(|tilt| *tilt > (first - RIGHTED).max(0.5 * first)).count();
+    }
+
     /// The greatest tilt of the thing itself, rad.
     fn own_tilt(&self) -> f64 {
-        self.axes.iter().map(|axis| between(*axis, [0.0, 0.0, 1.0])).fold(0.0, f64::max)
+        self.tilts().fold(0.0, f64::max)
+    }
+
+    /// How far the thing itself is tilted, place by place, rad.
+    fn tilts(&self) -> impl Iterator<Item = f64> {
+        self.axes.iter().map(|axis| between(*axis, [0.0, 0.0, 1.0]))
     }
 }
 
@@ -169,38 +180,37 @@ impl Stage<'_> {
         };
         let Some(Burden { loose, borne }) = self.burdens.get(&held).copied() else { return Ok(performed) };
         let shape = self.scene.get(held).shape.as_ref();
-        let filled = shape.zip(loose).and_then(|(shape, volume)| Filled::of(shape, volume));
+        let filled = shape
+            .zip(loose)
+            .and_then(|(shape, volume)| Filled::of(shape, volume, |inside| self.tilts.of(held, inside)));
+        if filled.is_none() && borne.is_none() {
+            return Ok(performed);
+        }
         let mut ride = before.ride(&performed, held, filled.as_ref().map_or(0.0, |filled| filled.surface));
         let borne = borne.unwrap_or(f64::INFINITY);
         if borne < GRAVITY {
             return Err(Refused::Slips(held, borne));
         }
         let slow = times(1.0, |times| (ride.pull(times) - GRAVITY) * MARGIN + GRAVITY > borne);
-        let pours = matches!(motion, Motion::Tilted { within: Some(_), .. });
-        let rights = matches!(motion, Motion::Tilted { .. }) && ride.is_set_upright();
-        let mut pace = (slow, 0.0);
-        if let Some(filled) = &filled {
-            let (mut wave, since) = before.waves.get(&held).copied().unwrap_or_default();
-            wave.follow([0.0; 2], filled.frequency, (before.now - since).max(0.0));
-            if pours {
-                // It is brought there first; what runs out then does not run into the target.
-                return Ok(self.poured(before, performed, (held, filled, wave), slow));
+        let Some(filled) = filled else { return Ok(performed.paced((slow, 0.0))) };
+        let (mut wave, since) = before.waves.get(&held).copied().unwrap_or_default();
+        wave.follow([0.0; 2], filled.frequency, (before.now - since).max(0.0));
+        match motion {
+            // It is brought there first; what runs out then does not run into the target.
+            Motion::Tilted { within: Some(_), .. } => {
+                return Ok(self.poured(before, performed, (held, &filled, wave), slow));
             }
-            if rights {
-                let tilts = ride.axes.iter().map(|axis| between(*axis, [0.0, 0.0, 1.0]));
-                let first = tilts.clone().next().unwrap_or_default();
-                ride.over = tilts.take_while(|tilt| *tilt > (first - RIGHTED).max(0.5 * first)).count();
-                pace = filled.calm(&ride, wave, slow);
-            } else {
+            Motion::Tilted { .. } if ride.is_set_upright() => ride.leave_out_pouring(),
+            _ => {
                 let lost = filled.lost(ride.own_tilt());
                 if lost > 0.0 {
                     return Err(Refused::Spills(held, lost));
                 }
-                pace = filled.calm(&ride, wave, slow);
             }
-            let wave = ride.swing(pace, wave, filled.frequency).wave;
-            self.waves.insert(held, (wave, before.now + performed.duration() * pace.0 + pace.1));
         }
+        let pace = filled.calm(&ride, wave, slow);
+        let wave = ride.swing(pace, wave, filled.frequency).wave;
+        self.waves.insert(held, (wave, before.now + performed.duration() * pace.0 + pace.1));
         Ok(performed.paced(pace))
     }
 

@@ -5,6 +5,7 @@ use matterix_ir::scene::{InstanceId, Scene};
 use matterix_motion::spheres::{Contact, Figure, Other};
 use serde::{Deserialize, Serialize};
 
+use super::slosh::GRAVITY;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
 
@@ -101,7 +102,7 @@ impl Refused {
             Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
             Refused::Slips(item, borne) => {
                 let item = &scene.get(*item).name;
-                format!("the fingers of `{name}` bear {:.2} of the weight of `{item}`", borne / 9.806_65)
+                format!("the fingers of `{name}` bear {:.2} of the weight of `{item}`", borne / GRAVITY)
             }
             Refused::Spills(item, lost) => {
                 let item = &scene.get(*item).name;

@@ -5,10 +5,12 @@
 //! Containers, NASA SP-106, 1966, chapter 2), hardly damped (chapter 4). What is then above the level of the rim's lowest point is lost. A plane that tilts
 //! as that wave does reaches a fifth higher at the wall than the wave, which is to the safe side.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use matterix_ir::math::{exp, sin_cos};
-use matterix_ir::scene::Shape;
+use matterix_ir::scene::{InstanceId, Shape};
 use matterix_ir::tilting::table;
 
 /// Standard gravity, m/s2.
@@ -22,10 +24,24 @@ const LITTLE: f64 = 2e-3;
 /// What may stand above the rim without running out, as a share of what fills the vessel: the error of the table.
 const SLACK: f64 = 1e-3;
 
+/// Tilt of a vessel and what stays in it at that, rad and m3.
+type Tilts = Arc<[[f64; 2]]>;
+
+/// The tables of vessels, made once for all motions. Copies share them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tables(Arc<Mutex<BTreeMap<InstanceId, Tilts>>>);
+
+impl Tables {
+    /// That of a vessel with this inside.
+    pub(super) fn of(&self, vessel: InstanceId, inside: &[[f64; 2]]) -> Tilts {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.entry(vessel).or_insert_with(|| table(inside).into()).clone()
+    }
+}
+
 /// A vessel with what is in it.
 pub(super) struct Filled {
-    /// Tilt and what stays at that, rad and m3.
-    tilts: Vec<[f64; 2]>,
+    tilts: Tilts,
     /// What is in it, m3.
     volume: f64,
     /// The frequency of its first wave, 1/s.
@@ -35,8 +51,8 @@ pub(super) struct Filled {
 }
 
 impl Filled {
-    /// Nothing where its inside is not known.
-    pub(super) fn of(shape: &Shape, volume: f64) -> Option<Self> {
+    /// Nothing where its inside is not known, or hardly anything is in it.
+    pub(super) fn of(shape: &Shape, volume: f64, table: impl FnOnce(&[[f64; 2]]) -> Tilts) -> Option<Self> {
         let Shape::Turned { inside, .. } = shape else { return None };
         let (surface, radius) = level(inside, volume)?;
         let depth = surface - inside.first()?[1];
@@ -49,7 +65,7 @@ impl Filled {
     }
 
     /// A volume that does not count, m3.
-    pub(super) fn little(&self) -> f64 {
+    fn little(&self) -> f64 {
         LITTLE * self.tilts.first().map_or(0.0, |p| p[1])
     }
 
@@ -129,7 +145,7 @@ mod tests {
     #[test]
     fn water_in_a_beaker_goes_to_and_fro_as_is_known() {
         // 200 mL stand 57.8 mm high: sqrt(1.8412 * 9.80665 / 0.0332) = 23.32 1/s, times sqrt(tanh(3.20)) = 0.9983.
-        let filled = Filled::of(&beaker(), 200e-6).expect("water");
+        let filled = Filled::of(&beaker(), 200e-6, |inside| table(inside).into()).expect("water");
         assert!((filled.surface - 0.0598).abs() < 1e-4, "{}", filled.surface);
         assert!((filled.frequency - 23.28).abs() < 0.02, "{}", filled.frequency);
         assert_eq!(level(&[[0.0, 0.0], [0.03, 0.0], [0.03, 0.1]], 0.0), None);
@@ -151,7 +167,7 @@ mod tests {
 
     #[test]
     fn what_stays_below_the_rim_is_not_lost() {
-        let filled = Filled::of(&beaker(), 200e-6).expect("water");
+        let filled = Filled::of(&beaker(), 200e-6, |inside| table(inside).into()).expect("water");
         // 200 of 322 mL: the surface reaches the lip at arctan(35.2 / 33.2) = 46.7 deg.
         assert_eq!(filled.lost(46.0_f64.to_radians()), 0.0);
         assert!(filled.lost(49.0_f64.to_radians()) > 5e-6);

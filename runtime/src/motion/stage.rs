@@ -22,7 +22,7 @@ use super::fingers::Fingers;
 use super::fixture::{Fixture, following, initial};
 use super::flight::Flight;
 use super::pace::Burden;
-use super::slosh::Wave;
+use super::slosh::{Tables, Wave};
 
 /// A robot and how it stands. What stays the same is shared by all copies of a stage.
 #[derive(Clone, Debug)]
@@ -88,6 +88,8 @@ pub struct Stage<'p> {
     /// Shared by all copies of a stage.
     pub(super) figures: Figures,
     /// Shared by all copies of a stage.
+    pub(super) tilts: Tables,
+    /// Shared by all copies of a stage.
     bodies: Arc<OnceLock<Vec<Option<Body>>>>,
 }
 
@@ -147,6 +149,7 @@ impl<'p> Stage<'p> {
             burdens: BTreeMap::new(),
             waves: BTreeMap::new(),
             figures: Figures::default(),
+            tilts: Tables::default(),
             bodies: Arc::default(),
         }
     }

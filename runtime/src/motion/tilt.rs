@@ -197,10 +197,10 @@ impl Stage<'_> {
         let Some(actor) = self.actors.get(&robot) else { return Vec::new() };
         let (base, here) = (self.foot(robot).inverse(), actor.configuration());
         let mut solver = actor.solver();
+        let tip = self.tip(robot);
         let mut found: Vec<(f64, Tilting, Option<Begun>, Vec<f64>)> = Vec::new();
         for way in ways {
             if let Some(angle) = tilted {
-                let tip = self.tip(robot);
                 let begun = way.begun(angle, tip);
                 let (far, turned) = distance(&pose(&way.at(angle, way.shift)), &pose(&tip));
                 // What is tilted, but elsewhere, is brought there as it is.
