@@ -435,7 +435,7 @@ module.exports = grammar({
     wires: ($) => block_of($, $._wire),
     _wire: ($) => choice($.wire_fixed, $.wire_alive, $.wire_repeat, $.wire_reply, $.wire_answers, $.wire_reading, $.wire_ignores, $.wire_command),
     wire_fixed: ($) => prec(1, seq(
-      choice('open', 'close', 'halt', 'safe', 'play'), optional(seq('while', field('condition', $.expression))), $._exchange,
+      choice('identity', 'open', 'close', 'halt', 'safe', 'play'), optional(seq('while', field('condition', $.expression))), $._exchange,
     )),
     wire_alive: ($) => seq(
       'alive', 'while', field('condition', $.expression), 'every', $._operand, 'within', $._operand,
@@ -454,7 +454,7 @@ module.exports = grammar({
     wire_ignores: ($) => seq('ignores', $.string),
     wire_command: ($) => seq(signature_of($, alias($._wire_verb, $.verb)), $._exchange),
     _wire_verb: ($) => seq(
-      choice('return', word_of($, 'open', 'close', 'halt', 'safe', 'play', 'alive', 'reply', 'answers', 'reading', 'ignores')), repeat($.identifier),
+      choice('return', word_of($, 'identity', 'open', 'close', 'halt', 'safe', 'play', 'alive', 'reply', 'answers', 'reading', 'ignores')), repeat($.identifier),
     ),
     _exchange: ($) => seq('sends', commas($, $.string), optional($._replies), optional($._wire_until)),
     _replies: ($) => seq('expects', commas($, $.string)),

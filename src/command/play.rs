@@ -79,6 +79,7 @@ pub fn play(
         DeviceError::Lost(why) | DeviceError::Silent(why) => (why.clone(), codes::DEVICE_LOST),
         DeviceError::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
         DeviceError::Unsaid(why) => (why.clone(), codes::UNSENDABLE),
+        DeviceError::Mistaken(why) => (why.clone(), codes::OTHER_DEVICE),
         DeviceError::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
     };
     let d = Diagnostic::error(code, *at, format!("`{device}`: {headline}"), "not run to its end");

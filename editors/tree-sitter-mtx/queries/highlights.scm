@@ -31,7 +31,7 @@
   "upright" "tilted" "about" "home" "joints"
 ] @keyword
 [
-  "sends" "asks" "expects" "alive" "reply" "answers" "hears" "ignores" "reading" "open" "close" "halt" "safe" "play" "over" "vary" "runs" "report" "data"
+  "sends" "asks" "expects" "alive" "reply" "answers" "hears" "ignores" "reading" "identity" "open" "close" "halt" "safe" "play" "over" "vary" "runs" "report" "data"
   "estimate" "match" "noise" "log"
 ] @keyword
 

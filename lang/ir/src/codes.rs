@@ -194,6 +194,7 @@ codes! {
     DEVICE_GARBLED "device-garbled" "W2" "a device answers what makes no sense";
     DEVICE_REFUSED "device-refused" "W2" "a device refuses what it is told or asked";
     UNSENDABLE "unsendable" "W2" "what a device is to be sent does not fit the form or frame that its driver declares";
+    OTHER_DEVICE "other-device" "W2" "another device answers than the one that is meant";
     DIVERGED "diverged" "W2" "a device tells something else than it was told, or than its twin";
     JOURNAL_MISMATCH "journal-mismatch" "W2" "a deployment cannot go on from its journal";
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";

@@ -176,6 +176,15 @@ pub struct Exchange {
     pub span: Span,
 }
 
+/// A question whose answer tells a device from others of its kind, as by its serial number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// What goes out and what comes back.
+    pub exchange: Exchange,
+    /// The words under which the answer keeps what tells it.
+    pub words: Vec<String>,
+}
+
 /// How the end of what a device does is known: it is asked again and again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Until {
@@ -298,6 +307,8 @@ pub struct Driver {
     pub address: Option<String>,
     /// Longest time until a reply has come, s.
     pub timeout: f64,
+    /// What asks the device which one of its kind it is, before all else that is said.
+    pub identity: Vec<Identity>,
     /// When the line is opened.
     pub open: Vec<Exchange>,
     /// When it is closed.

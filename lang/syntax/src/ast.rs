@@ -967,7 +967,7 @@ pub enum WireKind {
     },
     /// `open sends "1@1"`.
     Fixed {
-        /// `open`, `close`, `halt` or `safe`.
+        /// `identity`, `open`, `close`, `halt`, `safe` or `play`.
         when: Name,
         /// Only of devices of which this holds.
         condition: Option<Expr>,

@@ -17,7 +17,7 @@ use crate::place::{Place, SilaServer};
 
 mod sila;
 
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 15] = [
     "port",
     "address",
     "http",
@@ -26,6 +26,7 @@ const KEYS: [&str; 14] = [
     "unit",
     "by",
     "tolerance",
+    IDENTITY,
     CALIBRATION,
     sila::CERTIFICATE,
     sila::FINGERPRINT,
@@ -34,6 +35,7 @@ const KEYS: [&str; 14] = [
     sila::LOCK,
 ];
 const HAND: &str = "hand";
+const IDENTITY: &str = "identity";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
 pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<Diagnostic>) {
@@ -149,6 +151,7 @@ impl Reader<'_> {
                 at: Span::new(self.file, at.start, at.end),
                 carrier: Carrier::Hand,
                 tolerances: Vec::new(),
+                identity: None,
             };
             self.by_hand(key, &by, at, said.names_a_line());
             return (self.found.len() == before).then_some(binding);
@@ -171,9 +174,10 @@ impl Reader<'_> {
             self.wrong(at.clone(), &why, "not an address on this line", None);
         }
         let tolerances = self.tolerances(key, driver, table);
+        let identity = self.identity(key, driver, table);
         let carrier = Carrier::Line { driver, place, address: unit.map(|(unit, _)| unit) };
         let at = Span::new(self.file, at.start, at.end);
-        (self.found.len() == before).then_some(Binding { instance, at, carrier, tolerances })
+        (self.found.len() == before).then_some(Binding { instance, at, carrier, tolerances, identity })
     }
 
     /// Reports devices that are bound to one line and cannot be told apart there.
@@ -264,6 +268,19 @@ impl Reader<'_> {
         }
     }
 
+    /// Who a device has to be, where its driver can ask it.
+    fn identity(&mut self, key: &str, driver: usize, table: &DeTable<'_>) -> Option<String> {
+        let (identity, at) = self.text(table, IDENTITY)?;
+        let driver = &self.program.drivers[driver];
+        if driver.identity.is_empty() {
+            let headline = format!("`{}` cannot ask `{key}` who it is", driver.name);
+            let help = "add its line `identity sends \"...\" expects \"... {<serial>}\"`";
+            self.wrong(at, &headline, "never asked", Some(help.to_owned()));
+            return None;
+        }
+        Some(identity)
+    }
+
     /// Whether a driver can speak to a place said at `at`; none, and reported, where it cannot.
     fn fits(&mut self, driver: usize, place: &Place, at: &Range) -> Option<()> {
         let matterix_ir::wire::Driver { transport, name, .. } = &self.program.drivers[driver];
@@ -350,7 +367,13 @@ impl Reader<'_> {
                     self.wrong(at.clone(), &headline, "bound here", Some(help));
                 }
                 let carrier = Carrier::Shared { driver: index, host };
-                all.push(Binding { instance: d.instance, at: binding.at, carrier, tolerances: Vec::new() });
+                all.push(Binding {
+                    instance: d.instance,
+                    at: binding.at,
+                    carrier,
+                    tolerances: Vec::new(),
+                    identity: None,
+                });
             }
         }
         all

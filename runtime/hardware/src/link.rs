@@ -26,6 +26,8 @@ pub enum DeviceError {
     Garbled(String),
     /// A frame has no room for what was to be said, and nothing was.
     Unsaid(String),
+    /// It says that it is another device than the one that is meant.
+    Mistaken(String),
     /// The device says no: the failure its driver names, and in words.
     Refused {
         /// As in `reply "..." fails NAME`.
@@ -43,6 +45,7 @@ impl DeviceError {
             | DeviceError::Silent(text)
             | DeviceError::Garbled(text)
             | DeviceError::Unsaid(text)
+            | DeviceError::Mistaken(text)
             | DeviceError::Refused { text, .. } => text,
         }
     }
@@ -143,6 +146,11 @@ pub trait Line {
     /// What answers said that is put in later.
     fn kept(&self) -> Kept {
         Kept::new()
+    }
+
+    /// What answers of a device said last under this word, if any did.
+    fn word(&self, _device: InstanceId, _word: &str) -> Option<String> {
+        None
     }
 
     /// Whether something is to be put in that no answer has said: what it is about has never begun.
@@ -563,6 +571,13 @@ impl Line for Link {
         match &self.codec {
             Codec::Json(json) => json.kept().clone(),
             _ => Kept::new(),
+        }
+    }
+
+    fn word(&self, device: InstanceId, word: &str) -> Option<String> {
+        match &self.codec {
+            Codec::Json(json) => json.kept().get(&(device, word.to_owned())).cloned(),
+            _ => self.texts.get(word).cloned(),
         }
     }
 

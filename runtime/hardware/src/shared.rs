@@ -191,6 +191,7 @@ mod tests {
             framing: matterix_ir::wire::Framing::Calls,
             address: None,
             timeout: 1.0,
+            identity: Vec::new(),
             open: Vec::new(),
             close: Vec::new(),
             halt: Vec::new(),

@@ -83,7 +83,7 @@ fn an_overload_fails_a_command_and_is_a_fault_of_a_reading() {
     let cases = [("T", "T +\r\n", "run-failed"), ("S", "S +\r\n", "device-refused")];
     for (word, reply, code) in cases {
         let device = Device::start(b'\n', move |line, _| match line {
-            "@" => Answer::Says("I4 A \"1\"\r\n"),
+            "I4" | "@" => Answer::Says("I4 A \"1\"\r\n"),
             other if other == word => Answer::Says(reply),
             "T" => Answer::Says("T S 1.00 g\r\n"),
             _ => Answer::Says("S S 0.00 g\r\n"),

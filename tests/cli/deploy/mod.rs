@@ -5,6 +5,7 @@ mod bindings;
 mod faulty;
 mod framed;
 mod held;
+mod identity;
 mod journal;
 mod kills;
 mod late;

@@ -111,7 +111,7 @@ fn a_balance_tells_its_weight_in_the_unit_that_it_is_set_to() {
     for (name, reply) in [("g", "S S      1.25 g\r\n"), ("mg", "S S      1250 mg\r\n"), ("kg", "S S   0.00125 kg\r\n")]
     {
         let device = Device::start(b'\n', move |line, _| match line {
-            "@" => Answer::Says("I4 A \"1\"\r\n"),
+            "I4" | "@" => Answer::Says("I4 A \"1\"\r\n"),
             "T" => Answer::Says("T S 1.00 g\r\n"),
             _ => Answer::Says(reply),
         });
@@ -193,7 +193,7 @@ fn a_balance_that_is_not_steady_is_asked_again_and_then_given_up() {
         for (always, code) in [(false, 0), (true, 1)] {
             let asked = AtomicUsize::new(0);
             let device = Device::start(b'\n', move |line, _| match line {
-                "@" => Answer::Says("I4 A \"1\"\r\n"),
+                "I4" | "@" => Answer::Says("I4 A \"1\"\r\n"),
                 "T" => Answer::Says("T S 1.00 g\r\n"),
                 _ if always || asked.fetch_add(1, Ordering::SeqCst) == 0 => Answer::Says(reply),
                 _ => Answer::Says("S S 1.25 g\r\n"),

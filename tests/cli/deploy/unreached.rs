@@ -112,10 +112,10 @@ impl Door {
 }
 
 /// Slow enough for a process to be killed on the way.
-const SLOW: &str = "4";
+pub(super) const SLOW: &str = "4";
 
 /// No watchdog minds how long nobody is there.
-const WEIGH: &str = "mtx 1
+pub(super) const WEIGH: &str = "mtx 1
 use std::balances::PrecisionBalance
 lab bench { ambient: 22 degC, scale = PrecisionBalance at (0, 0, 0) m }
 workflow weigh_it in bench {
@@ -126,7 +126,7 @@ workflow weigh_it in bench {
 ";
 
 /// Deploys a workflow through a port, and kills it on the way.
-fn killed(dir: &Path) {
+pub(super) fn killed(dir: &Path) {
     let mut process = command();
     process.current_dir(dir).args(["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real"]);
     process.args(["--journal", "journal", "--speed", SLOW]).stdout(Stdio::null()).stderr(Stdio::null());

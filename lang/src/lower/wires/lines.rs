@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use matterix_ir::wire::{Exchange, Pattern, Piece, Slot, Template, Told, Until};
+use matterix_ir::wire::{Exchange, Framing, Identity, Pattern, Piece, Slot, Template, Told, Until};
 use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
 
 use super::forms::Speech;
+use super::message::kept_words;
 use crate::ast::{self, ExprKind, Path, TextPart};
 use crate::declare::tables::MemberRef;
 use crate::eval::lab::Mode;
@@ -44,6 +45,27 @@ impl<'a> Planner<'a, '_> {
             None => None,
         };
         Some(Exchange { sends, expects, until, span })
+    }
+
+    /// The question who a device is: one message, and an answer with words that say so.
+    pub(super) fn identity(&mut self, exchange: Exchange, framing: &Framing) -> Option<Identity> {
+        let help = "write `identity sends \"I4\" expects \"I4 A {<serial>}\"`";
+        let span = exchange.span;
+        if *framing == Framing::Calls {
+            let headline = "a server of SiLA 2 is told from others by its UUID";
+            self.wrong(span, headline, "not asked by a driver", "bind the device by it: `sila = \"UUID\"`");
+            return None;
+        }
+        if exchange.sends.len() != 1 || exchange.until.is_some() {
+            self.wrong(span, "one question asks a device who it is", "not one question", help);
+            return None;
+        }
+        let words = exchange.expects.as_ref().map(|expects| kept_words(expects, framing)).unwrap_or_default();
+        if words.is_empty() {
+            self.wrong(span, "no word of the answer says who the device is", "keeps nothing of it", help);
+            return None;
+        }
+        Some(Identity { exchange, words })
     }
 
     /// A text to send.

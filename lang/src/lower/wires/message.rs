@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::message::{self, Field};
-use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Piece, Template};
+use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Piece, Slot, Template};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::hosted::Under;
@@ -21,6 +21,7 @@ impl<'a> Planner<'a, '_> {
         }
         let known: BTreeSet<String> =
             wires.iter().chain(under.map_or(&[][..], |u| u.wires)).flat_map(kept_by).collect();
+        driver.identity.iter().for_each(|identity| self.check_exchange(&identity.exchange, &known));
         let exchanges = [&driver.open, &driver.close, &driver.halt, &driver.safe, &driver.play].into_iter().flatten();
         let served = driver.served.iter().chain(driver.alive.iter().map(|a| &a.repeated)).map(|s| &s.exchange);
         for exchange in exchanges.chain(served) {
@@ -105,6 +106,20 @@ impl<'a> Planner<'a, '_> {
 
 fn put_in<'t>(fields: &[Field<'t>]) -> impl Iterator<Item = &'t str> {
     fields.iter().filter_map(|f| message::kept(f.value))
+}
+
+/// The words that an answer of this form keeps.
+pub(super) fn kept_words(expects: &Pattern, framing: &Framing) -> Vec<String> {
+    let in_slots = expects.slots.iter().filter_map(|slot| match slot {
+        Slot::Kept(word) => Some(word.clone()),
+        _ => None,
+    });
+    if *framing != Framing::Json {
+        return in_slots.collect();
+    }
+    let text = expects.with(VALUE);
+    let fields = message::answer(&text).map(|answer| answer.fields).unwrap_or_default();
+    put_in(&fields).map(str::to_owned).collect()
 }
 
 /// The words that the answers of a line are kept under.

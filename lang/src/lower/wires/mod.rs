@@ -162,6 +162,7 @@ impl<'a> Planner<'a, '_> {
             framing: line.framing,
             address: line.address,
             timeout: line.timeout,
+            identity: Vec::new(),
             open: Vec::new(),
             close: Vec::new(),
             halt: Vec::new(),
@@ -226,6 +227,7 @@ impl<'a> Planner<'a, '_> {
             WireKind::Fixed { when, exchange, .. } => {
                 let Some(exchange) = self.exchange(exchange, w.span, &mut scope) else { return };
                 match when.text.as_str() {
+                    "identity" => driver.identity.extend(self.identity(exchange, &driver.framing)),
                     "open" => driver.open.push(exchange),
                     "close" => driver.close.push(exchange),
                     "halt" => driver.halt.push(exchange),

@@ -28,7 +28,10 @@ impl Hardware<'_, '_> {
         let asked = asked_for(self.program, &self.observed);
         for (device, driver, link) in (0..self.devices.len()).filter_map(|index| self.spoken_to(index)) {
             let cannot = |what: &str, why: &str| format!("`{}` cannot {what} `{}`: {why}", driver.name, device.name);
-            for exchange in [&driver.open, &driver.close, &driver.halt, &driver.safe].into_iter().flatten() {
+            let identities = driver.identity.iter().map(|identity| &identity.exchange);
+            for exchange in
+                identities.chain([&driver.open, &driver.close, &driver.halt, &driver.safe].into_iter().flatten())
+            {
                 let wrong = self.refused(exchange, link);
                 found.extend(wrong.into_iter().map(|why| finding(exchange.span, &cannot("speak to", &why))));
             }

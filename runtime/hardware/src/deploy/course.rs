@@ -18,6 +18,7 @@ use super::control::Control;
 use super::device::{Binding, Carrier, Device};
 use super::exposed::Exposed;
 use super::hardware::{Hardware, Mode, Settings, Unreached};
+use super::identity::first_said;
 use super::journal::{Entry, Journal, VERSION, digest};
 use super::moved::{mixed_up, places};
 use super::preflight::preflight;
@@ -133,7 +134,8 @@ pub fn carry_out(
                     Some(refused(at, "the devices of this journal were made safe when it could not be gone on with"))
                 }
                 false => unfit(at, &before, &digest, (speed, seed)).or_else(|| {
-                    let why = mixed_up(&places(&before), devices.as_deref().unwrap_or_default())?;
+                    let devices = devices.as_deref().unwrap_or_default();
+                    let why = mixed_up(&places(&before), &first_said(&before), devices)?;
                     Some(refused(at, &format!("{why}: nobody can tell which of them is which")))
                 }),
             };
@@ -340,11 +342,13 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
         DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
         DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
         DeviceError::Unsaid(_) => codes::UNSENDABLE,
+        DeviceError::Mistaken(_) => codes::OTHER_DEVICE,
         DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
     };
     let what = match trouble {
         DeviceError::Lost(_) | DeviceError::Silent(_) => "cannot be reached",
         DeviceError::Unsaid(_) => "cannot be spoken to",
+        DeviceError::Mistaken(_) => "is another device",
         DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is not what it is bound as",
     };
     let headline = format!("`{device}` {what}: {}", trouble.text());

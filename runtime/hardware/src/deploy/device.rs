@@ -47,6 +47,8 @@ pub struct Binding {
     pub carrier: Carrier,
     /// By how much what it tells may differ from the twin: member, SI.
     pub tolerances: Vec<(String, f64)>,
+    /// What it says when it is asked who it is, where the bindings say so.
+    pub identity: Option<String>,
 }
 
 /// When something that is repeated was last said.

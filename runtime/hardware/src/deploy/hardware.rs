@@ -16,6 +16,7 @@ use super::Trace;
 use super::control::Control;
 use super::device::Device;
 use super::exposed::Exposed;
+use super::identity::Words;
 use super::journal::{Entry, Gate, Journal, sha256};
 use super::observe::Observed;
 use crate::link::DeviceError;
@@ -148,6 +149,8 @@ pub struct Hardware<'m, 't> {
     pub(super) broken_meanwhile: Vec<u32>,
     /// Where each device was bound when that was last noted, by its name.
     pub(super) places: BTreeMap<String, String>,
+    /// What devices said first that is kept, after the journal that is gone on with.
+    pub(super) said_first: Words,
     /// When devices were last asked in between whether they are as they were told to be, by the clock that never goes back.
     pub(super) looked: Duration,
     /// A device or a line has failed: what else differs follows from that.
@@ -216,6 +219,7 @@ impl<'m, 't> Hardware<'m, 't> {
             waits: 0,
             broken_meanwhile: Vec::new(),
             places: BTreeMap::new(),
+            said_first: Words::new(),
             looked: origin.1,
             is_troubled: false,
             held_up: Vec::new(),
@@ -288,6 +292,7 @@ impl<'m, 't> Hardware<'m, 't> {
             DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
             DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
             DeviceError::Unsaid(_) => codes::UNSENDABLE,
+            DeviceError::Mistaken(_) => codes::OTHER_DEVICE,
             DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
         };
         if matches!(trouble, DeviceError::Lost(_) | DeviceError::Silent(_)) {

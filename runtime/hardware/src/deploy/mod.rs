@@ -10,6 +10,7 @@ mod course;
 mod device;
 mod exposed;
 mod hardware;
+mod identity;
 mod journal;
 mod moved;
 mod observe;

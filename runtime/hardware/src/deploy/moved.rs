@@ -7,6 +7,7 @@ use matterix_runtime::backend::Backend;
 
 use super::device::{Carrier, Device};
 use super::hardware::Hardware;
+use super::identity::Words;
 use super::journal::Entry;
 
 /// Where each device was last, by its name.
@@ -26,13 +27,14 @@ fn place(device: &Device<'_>) -> Option<String> {
     }
 }
 
-/// Why nobody can tell which device is which, where some have moved since the journal was left.
-pub(super) fn mixed_up(before: &BTreeMap<String, String>, devices: &[Device<'_>]) -> Option<String> {
+/// Why nobody can tell which device is which, where some have moved since the journal was left. One that says who it is, as no other
+/// one did, is asked once its line is open.
+pub(super) fn mixed_up(before: &BTreeMap<String, String>, said: &Words, devices: &[Device<'_>]) -> Option<String> {
     // By the driver: the places that its devices have left.
     let mut left: BTreeMap<&str, BTreeMap<&str, &str>> = BTreeMap::new();
     for device in devices {
         let (Some(now), Some(then)) = (place(device), before.get(device.name)) else { continue };
-        if now == *then {
+        if now == *then || is_known(device, said) {
             continue;
         }
         let here: BTreeSet<&str> = before.iter().filter(|(_, at)| **at == now).map(|(name, _)| name.as_str()).collect();
@@ -46,6 +48,17 @@ pub(super) fn mixed_up(before: &BTreeMap<String, String>, devices: &[Device<'_>]
     let several = left.into_values().find(|places| places.len() > 1)?;
     let names = several.values().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
     Some(format!("{names} are alike and were all moved since the journal was left"))
+}
+
+/// Whether a device said who it is, and no other one said the same.
+fn is_known(device: &Device<'_>, said: &Words) -> bool {
+    let words = device.driver.iter().flat_map(|driver| &driver.identity).flat_map(|identity| &identity.words);
+    let own: Vec<(&str, Option<&String>)> =
+        words.map(|word| (word.as_str(), said.get(&(device.name.to_owned(), word.clone())))).collect();
+    own.iter().any(|(word, text)| {
+        let others = said.iter().filter(|((name, of), _)| name != device.name && of == word);
+        text.is_some() && others.into_iter().all(|(_, other)| Some(other) != *text)
+    })
 }
 
 impl Hardware<'_, '_> {

@@ -7,6 +7,7 @@ use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
 use super::hardware::{Hardware, Mode};
+use super::identity::first_said;
 use super::journal::{Entry, VERSION};
 use super::moved::places;
 use super::preflight::asked_for;
@@ -57,6 +58,7 @@ impl Hardware<'_, '_> {
         };
         self.left_at = self.last_seen(&entries);
         self.places = places(&entries);
+        self.said_first = first_said(&entries);
         if self.settings.mode != Mode::Replay {
             self.expose();
         }
@@ -119,6 +121,7 @@ impl Hardware<'_, '_> {
         }
         self.forget_beats();
         self.set_clock();
+        self.are_the_same()?;
         self.check_devices()?;
         self.in_time(&watchdogs)?;
         // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.

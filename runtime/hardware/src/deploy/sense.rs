@@ -36,6 +36,10 @@ impl Hardware<'_, '_> {
 
     /// Says over open lines what drivers say first; what went wrong, and where the device is bound.
     pub fn open(&mut self) -> Result<(), (Fault, Option<Span>)> {
+        if let Err((index, trouble, span)) = self.identify() {
+            let fault = self.trouble(index, &trouble, span);
+            return Err((fault, Some(self.devices[index].binding.at)));
+        }
         for index in 0..self.devices.len() {
             let (driver, at) = (self.devices[index].driver, self.devices[index].binding.at);
             for exchange in driver.iter().flat_map(|driver| &driver.open) {

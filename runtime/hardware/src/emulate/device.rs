@@ -382,7 +382,8 @@ fn refusal(word: &str, verb: &str, need: &Condition) -> String {
 
 /// What is said apart from commands, and whether it breaks off what the device does.
 fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
-    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.play).map(|e| (e, false));
+    let asked = driver.identity.iter().map(|identity| &identity.exchange);
+    let quiet = asked.chain(&driver.open).chain(&driver.close).chain(&driver.play).map(|e| (e, false));
     driver.halt.iter().chain(&driver.safe).map(|e| (e, true)).chain(quiet)
 }
 
