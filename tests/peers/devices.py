@@ -8,6 +8,7 @@ drivers from PyPI run unchanged on its emulators. Each line printed is a figure 
 
 import os
 import pathlib
+import random
 import re
 import signal
 import socket
@@ -15,6 +16,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 
 COMMAND, FOLDER = sys.argv[1], sys.argv[2]
 SPEED = 10
@@ -47,6 +49,10 @@ workflow weigh_it in bench {
 """
 
 DOSE = (pathlib.Path(__file__).parent.parent / "deploy" / "dose.mtx").read_text()
+
+
+# What the plunger is told for it, round(volume * 3000 / 5 mL).
+STROKES = ["A1274", "A674", "A0"]
 
 
 def verdict(what, good, said=""):
@@ -183,6 +189,57 @@ def lossy():
     verdict("a line that loses readings", good, f"{again} of {count} were asked for again" if good else ended.stderr[-1500:])
 
 
+def killed():
+    """Deployments that are killed at many moments and gone on with: no stroke twice, nothing left on that is not named."""
+    from labmcp_cavro.simulator import CavroSimulator
+    from labmcp_ika.simulator import IKASimulator
+
+    chance, kills = random.Random(19), int(os.environ.get("MATTERIX_KILLS", "100")) // 2
+    outcomes, bad = {"went on": 0, "refused": 0, "over": 0}, []
+    for n in range(kills):
+        pump = CavroSimulator(standard_steps=3000, valve_ports=9, speed=SPEED)
+        address, heard = serve(pump, b"\r", b"\x03\r\n")
+        end = gone_on_with(f"kill_dose_{n}", DOSE, "pump", address, chance.uniform(0, 1.0), 'driver = "CavroDt"\n')
+        outcomes[end.kind] += 1
+        strokes = [m for line, _ in heard for m in re.findall(r"A\d+", line) if line.endswith("R")]
+        rests = not any(a["kind"] == "plunger" for a in pump.plan)
+        whole = strokes == STROKES if end.code == 0 else strokes == STROKES[: len(strokes)] and rests
+        if not whole:
+            bad.append(f"{n}: {strokes} {end.said[-800:]}")
+    verdict(f"labmcp-cavro, killed at {kills} moments", not bad, "\n".join(bad) or f"no stroke twice; {outcomes}")
+
+    outcomes, bad = {"went on": 0, "refused": 0, "over": 0}, []
+    for n in range(kills):
+        plate = IKASimulator(time_scale=SPEED)
+        address, heard = serve(plate, b"\r\n", b"\r\n")
+        end = gone_on_with(f"kill_heat_{n}", HEAT, "plate", address, chance.uniform(0, 4.5))
+        outcomes[end.kind] += 1
+        if plate.heating or plate.motor or (end.code != 0 and end.kind != "refused"):
+            bad.append(f"{n}: {plate.heating} {plate.motor} {end.said[-800:]}")
+    verdict(f"labmcp-ika, killed at {kills} moments", not bad, "\n".join(bad) or f"it neither heats nor stirs; {outcomes}")
+
+
+def gone_on_with(name, text, device, address, after, more=""):
+    """What became of a deployment that was killed so many s after its journal was begun, and gone on with."""
+    folder = pathlib.Path(FOLDER, name)
+    folder.mkdir()
+    for file, content in (("lab.mtx", text), ("lab.toml", f'[{device}]\naddress = "{address}"\n{more}')):
+        (folder / file).write_text(content)
+    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", str(SPEED)]
+    command = [COMMAND, "deploy", "lab.mtx", *arguments]
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while not (folder / "journal").exists() and process.poll() is None:
+        time.sleep(0.002)
+    time.sleep(after)
+    process.kill()
+    first = process.communicate()[1]
+    if process.returncode == 0:
+        return types.SimpleNamespace(kind="over", code=0, said=first)
+    ended = subprocess.run([*command, "--resume"], cwd=folder, capture_output=True, text=True)
+    is_refused = ended.returncode == 1 and "journal-mismatch" in ended.stderr
+    return types.SimpleNamespace(kind="refused" if is_refused else "went on", code=ended.returncode, said=ended.stderr)
+
+
 def drivers():
     from matterlab_hotplates import IKAHotplate
     from matterlab_pumps import TecanXCPump
@@ -224,5 +281,6 @@ def drivers():
 deployments()
 stopped()
 lossy()
+killed()
 drivers()
 sys.exit(1 if BAD else 0)
