@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use matterix_ir::inventory::Inventory;
-use matterix_ir::model::{Content, Load, Mixture, Model, Observable};
+use matterix_ir::model::{Content, Load, Mixture, Model, Observable, Pace};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
@@ -772,7 +772,7 @@ fn build<'a>(
         false => (Vec::new(), Vec::new()),
     };
     let (flows, places) = (elaborator.told_flows(), elaborator.told_places());
-    let loads = loads(&mut elaborator);
+    let (loads, paces) = in_hand(&mut elaborator);
     let model = Model {
         flows,
         places,
@@ -789,6 +789,7 @@ fn build<'a>(
         species: tables.species.iter().map(|(_, s)| species(s)).collect(),
         mixtures,
         loads,
+        paces,
         observables: observables.into_iter().map(|o| o.2).collect(),
         balances,
         temperatures,
@@ -805,12 +806,14 @@ fn build<'a>(
     Some(Built { program, wiring, points, noted, findings, starts, uses, many, choices, reach, moved: None })
 }
 
-/// How the things of a lab may be moved; where no robot carries any, nothing is asked for.
-fn loads(lab: &mut Elaborator<'_>) -> Vec<Load> {
+/// How the things of a lab may be moved, and how fast its robots go; where no robot carries any, nothing is asked for.
+fn in_hand(lab: &mut Elaborator<'_>) -> (Vec<Load>, Vec<Pace>) {
     if !lab.has_robots() {
-        return Vec::new();
+        return (Vec::new(), Vec::new());
     }
-    (0..lab.instances.len() as u32).filter_map(|index| lab.load(InstanceId(index))).collect()
+    let all = (0..lab.instances.len() as u32).map(InstanceId);
+    let (things, robots) = (all.clone(), all);
+    (things.filter_map(|id| lab.load(id)).collect(), robots.filter_map(|id| lab.pace(id)).collect())
 }
 
 fn species(s: &crate::declare::species::SpeciesDef<'_>) -> matterix_ir::model::Species {

@@ -59,6 +59,7 @@ mod spills;
 mod stopped;
 mod strict;
 mod studies;
+mod tempo;
 mod time;
 mod together;
 mod twin;

@@ -351,6 +351,17 @@ pub struct Load {
     pub taxed: Option<NodeId>,
 }
 
+/// How fast a robot goes, where that is not as fast as its joints can.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pace {
+    /// The robot.
+    pub robot: InstanceId,
+    /// How many times as long its motions take.
+    pub slowness: Option<NodeId>,
+    /// The greatest speed of its tip, m/s.
+    pub tip_speed: Option<NodeId>,
+}
+
 /// The flattened model of one lab.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -381,6 +392,9 @@ pub struct Model {
     /// How things may be moved that robots hold; only in labs with robots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
+    /// Robots that go slower than they can.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub paces: Vec<Pace>,
     /// Derived quantities to record.
     pub observables: Vec<Observable>,
     /// Sums that must close.

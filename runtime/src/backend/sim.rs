@@ -13,7 +13,7 @@ use super::carried::{APART, Attendant, Overflow, Told};
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
-use crate::motion::{Burden, Moment, Refused, Stage, supported};
+use crate::motion::{Burden, Moment, Refused, Stage, supported, tempi};
 use crate::process::{Advance, Engine, Watch};
 
 /// What moves through space.
@@ -250,6 +250,7 @@ impl<'m> Sim<'m> {
         let burden = |load: &Load| Burden::of(load, value);
         let burdens: Vec<_> = held.map(|load| (load.instance, burden(load))).collect();
         stage.burden(burdens);
+        stage.keep_time(tempi(&self.prepared.model.paces, |node| Some(self.engine.eval(node))));
         let now = self.engine.time();
         let Some(performed) = stage.set_out(&motion, &values)? else {
             // What changes hands does so while both stand still.

@@ -22,11 +22,15 @@ impl Stage<'_> {
     /// [`Motion::values`], SI.
     pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         if self.burdens.is_empty() {
-            return self.carry_out(motion, values);
+            let performed = self.carry_out(motion, values)?;
+            return Ok(performed.map(|performed| self.in_time(motion, performed)));
         }
         let before = self.clone();
         match self.carry_out(motion, values)? {
-            Some(performed) => self.calmed(&before, motion, performed).map(Some),
+            Some(performed) => {
+                let performed = self.in_time(motion, performed);
+                self.calmed(&before, motion, performed).map(Some)
+            }
             None => Ok(None),
         }
     }
@@ -67,6 +71,7 @@ impl Stage<'_> {
                 let angle = next();
                 let shift = if shift.is_some() { [next(), next(), next()] } else { [0.0; 3] };
                 let performed = self.tilt(robot, (*item, point), (*goal, frame), (angle, shift), parts)?;
+                let performed = self.slowed(performed);
                 Ok(Some(performed.lasting(next())))
             }
             Motion::Drive { mover, goal, frame } => {

@@ -23,6 +23,7 @@ use super::fixture::{Fixture, following, initial};
 use super::flight::Flight;
 use super::pace::Burden;
 use super::slosh::{Tables, Wave};
+use super::tempo::Tempo;
 
 /// A robot and how it stands. What stays the same is shared by all copies of a stage.
 #[derive(Clone, Debug)]
@@ -83,6 +84,8 @@ pub struct Stage<'p> {
     pub unknown: Unknown,
     /// What is known of things in hand.
     pub(super) burdens: BTreeMap<InstanceId, Burden>,
+    /// How fast robots are meant to go, where that is slower than they can.
+    pub(super) tempi: BTreeMap<InstanceId, Tempo>,
     /// The waves that motions left in what was carried, each with when that was, s.
     pub(super) waves: BTreeMap<InstanceId, (Wave, f64)>,
     /// The waves with which the last motions of what is carried began.
@@ -149,6 +152,7 @@ impl<'p> Stage<'p> {
             effort: Cell::default(),
             unknown: Unknown::default(),
             burdens: BTreeMap::new(),
+            tempi: BTreeMap::new(),
             waves: BTreeMap::new(),
             began: BTreeMap::new(),
             figures: Figures::default(),

@@ -256,9 +256,11 @@ fn nothing_begins_while_it_is_paused_and_one_step_begins_at_a_time() {
         .collect();
     let [(pause, _), (step, stepped), (go, went)] = &gates[..] else { panic!("{gates:?}") };
     assert_eq!([pause.as_str(), step, go], ["pause", "step", "go"]);
-    assert_eq!(began(&left.journal, "stir plate at 300 rpm"), *stepped);
+    // Where the machine has other work, the lab is as late as the clock says.
+    let late = |what, gate: f64| began(&left.journal, what) - gate;
+    assert!((0.0..1.0).contains(&late("stir plate at 300 rpm", *stepped)), "{:?}", left.journal);
     assert!(went - stepped > 10.0, "the wait is over meanwhile");
-    assert_eq!(began(&left.journal, "stop stirring plate"), *went);
+    assert!((0.0..1.0).contains(&late("stop stirring plate", *went)), "{:?}", left.journal);
 }
 
 #[test]

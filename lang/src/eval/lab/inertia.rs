@@ -1,7 +1,7 @@
 //! Mass of a body and how it is distributed: given with `inertia`, or that of one density in its shape.
 
 use matterix_ir::inertia::{impossible, of_shapes};
-use matterix_ir::model::Load;
+use matterix_ir::model::{Load, Pace};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Inertial;
 use matterix_ir::scene::{InstanceId, frame};
@@ -22,6 +22,10 @@ const STOPOVER: &str = "stopover";
 /// the grip bears that an acceleration takes up.
 const LOOSE: (&str, &str) = ("loose", "Volume");
 const TAXED: (&str, &str) = ("taxed", "Ratio");
+
+/// The members that say how fast a robot goes: how many times as long its motions take, and the greatest speed of its tip.
+const SLOWNESS: (&str, &str) = ("slowness", "Ratio");
+const TIP_SPEED: (&str, &str) = ("tip_speed", "Speed");
 
 /// How many times the moments may be above what the mass has where it is farthest from its centre: shapes are nominal.
 const NOMINAL: f64 = 2.0;
@@ -67,13 +71,25 @@ impl<'a> Elaborator<'a> {
         (loose.is_some() || taxed.is_some()).then_some(Load { instance: id, loose, taxed })
     }
 
+    /// How fast a robot goes, where it does not go as fast as it can.
+    pub fn pace(&mut self, robot: InstanceId) -> Option<Pace> {
+        let slowness = self.unless(robot, SLOWNESS, 1.0);
+        let tip_speed = self.unless(robot, TIP_SPEED, f64::INFINITY);
+        (slowness.is_some() || tip_speed.is_some()).then_some(Pace { robot, slowness, tip_speed })
+    }
+
     /// The value of a member of this name and dimension, if the instance has one that is not always 0.
-    fn changing(&mut self, id: InstanceId, (name, dimension): (&str, &str)) -> Option<NodeId> {
+    fn changing(&mut self, id: InstanceId, member: (&str, &str)) -> Option<NodeId> {
+        self.unless(id, member, 0.0)
+    }
+
+    /// The value of a member of this name and dimension, if the instance has one that is not always this one, SI.
+    fn unless(&mut self, id: InstanceId, (name, dimension): (&str, &str), usual: f64) -> Option<NodeId> {
         let member = self.members_of(id, name).first().copied()?;
         let at = self.instances[id.0 as usize].span;
         let Value::Num(n) = self.member_value(id, member, at) else { return None };
         let counts =
-            n.dimension.agrees(&self.tables.units.named(dimension)) && self.graph.constant(n.node) != Some(0.0);
+            n.dimension.agrees(&self.tables.units.named(dimension)) && self.graph.constant(n.node) != Some(usual);
         counts.then_some(n.node)
     }
 

@@ -12,9 +12,9 @@ use super::diagnostics;
 use super::memory::{Memory, Outcome};
 use super::more::More;
 use super::offer::Missed;
-use crate::motion::Burden;
 use crate::motion::refused::Refused;
 use crate::motion::stage::Stage;
+use crate::motion::{Burden, tempi};
 
 /// Looks at motions, each from the same moment only once.
 pub struct Looker<'p, 's> {
@@ -60,6 +60,8 @@ impl<'p, 's> Looker<'p, 's> {
         let burdens = carried.map(|load| (load.instance, Burden::of(load, value)));
         let burdens: Vec<_> = burdens.filter(|(_, burden)| *burden != Burden::default()).collect();
         course.stage.burden(burdens);
+        let tempi = tempi(&model.paces, |node| course.values.value(model, node));
+        course.stage.keep_time(tempi);
         match &motion {
             Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),
             Motion::Free { item, on, .. } => self.free(course, &motion, robot, (*item, *on), site, beside),

@@ -96,6 +96,10 @@ impl<'s> Memory<'s> {
                 hash.write_u64(known.unwrap_or(f64::NAN).to_bits());
             }
         }
+        for (id, tempo) in &stage.tempi {
+            hash.write_u32(id.0);
+            [tempo.slowness, tempo.tip_speed].into_iter().for_each(|known| hash.write_u64(known.to_bits()));
+        }
         seal::hex(&hash)
     }
 

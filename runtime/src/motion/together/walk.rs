@@ -14,6 +14,7 @@ use crate::motion::preflight::beside::Job;
 use crate::motion::preflight::supported;
 use crate::motion::preflight::values::Values;
 use crate::motion::stage::Stage;
+use crate::motion::tempo::tempi;
 
 /// How many motions are followed before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;
@@ -153,6 +154,7 @@ impl<'p> Walk<'p, '_> {
         let values = self.values.of_motion(model, &self.stage, motion, operation);
         let Some(values) = values else { return self.perhaps(true) };
         let straight = matches!(motion, Motion::By { straight: true, .. } | Motion::To { straight: true, .. });
+        self.stage.keep_time(tempi(&model.paces, |node| self.values.value(model, node)));
         let before = self.stage.clone();
         match self.stage.perform(motion, &values) {
             Ok(Some(performed)) => {
