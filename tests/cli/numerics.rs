@@ -106,6 +106,21 @@ fn what_a_feed_of_microlitres_comes_to_is_known_beforehand() {
 }
 
 #[test]
+fn what_is_unlimited_is_shown_as_that() {
+    let dir = folder("numerics_endless");
+    let text = "mtx 1\nconst a: Length? = unlimited\nlab bench { ambient: 22 degC }\nworkflow w in bench {\n    \
+                expect a in 2 m .. 5 m\n    expect a in unlimited .. 5 m\n    expect 1 m in 2 m .. unlimited\n    note \"up to {a}\"\n}\n";
+    write(&dir, "endless.mtx", text);
+    for command in [["check", "--no-cache", "endless.mtx"].as_slice(), &["run", "endless.mtx"]] {
+        let said = matterixc_in(&dir, command);
+        let all = said.out + &said.err;
+        assert!(said.code == 1 && all.contains("is unlimited, allowed is 2 m .. 5 m"), "{all}");
+        assert!(all.contains("is unlimited, at most 5 m") && all.contains("is 1 m, at least 2 m"), "{all}");
+        assert!(!all.contains("inf"), "{all}");
+    }
+}
+
+#[test]
 fn what_is_unlimited_is_more_than_any_number() {
     let dir = folder("numerics_unlimited");
     let text = "mtx 1\nconst a: Length? = unlimited\nconst b: Length = 5 m\nlab bench { ambient: 22 degC }\nworkflow w in bench {\n    \

@@ -36,6 +36,9 @@ impl Unit {
 
     /// The value with six significant digits at most and its symbol: `76.33 degC`.
     pub fn show(&self, si: f64) -> String {
+        if let Some(endless) = show_endless(si) {
+            return endless.to_owned();
+        }
         let number = show_number(self.of_si(si));
         if self.symbol.is_empty() { number } else { format!("{number} {}", self.symbol) }
     }
@@ -70,6 +73,15 @@ pub fn show_duration(seconds: f64) -> String {
     parts.join(" ")
 }
 
+/// What has no end, in the word of the language: no unit goes with it.
+pub fn show_endless(value: f64) -> Option<&'static str> {
+    match value {
+        f64::INFINITY => Some("unlimited"),
+        f64::NEG_INFINITY => Some("-unlimited"),
+        _ => None,
+    }
+}
+
 /// Six significant digits at most, without trailing zeros; powers of ten outside 1e-4 .. 1e7.
 pub fn show_number(value: f64) -> String {
     if value == 0.0 {
@@ -80,4 +92,20 @@ pub fn show_number(value: f64) -> String {
     }
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
     if (1e-4..1e7).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_end_is_shown_as_it_is_written() {
+        let ml = Unit::scaled("mL", 1e-6);
+        assert_eq!(ml.show(f64::INFINITY), "unlimited");
+        assert_eq!(ml.show(5e-6), "5 mL");
+        assert_eq!(
+            Unit { symbol: "degC".to_owned(), factor: 1.0, offset: 273.15 }.show(f64::NEG_INFINITY),
+            "-unlimited"
+        );
+    }
 }

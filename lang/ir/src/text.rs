@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::quantity::show_number;
+use crate::quantity::{show_endless, show_number};
 use crate::{NodeId, Unit};
 
 /// A text of a note, a question or a failure.
@@ -82,6 +82,9 @@ impl Text {
 
 /// A value in a unit, with so many digits after the point.
 fn quantity(unit: &Unit, si: f64, digits: Option<u8>) -> String {
+    if let Some(endless) = show_endless(si) {
+        return endless.to_owned();
+    }
     let value = unit.of_si(si);
     let number = match digits {
         // Rounded to nothing, a small negative number is no longer negative.

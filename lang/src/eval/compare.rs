@@ -271,7 +271,9 @@ impl<'a> Elaborator<'a> {
                 let above = self.graph.binary(BinaryOp::Le, low.node, value.node);
                 let below = self.graph.binary(BinaryOp::Le, value.node, high.node);
                 let unit = self.unit_between(&value, &low);
-                let (low, high) = (Some(low.node), Some(high.node));
+                // An end that no value is beyond is none.
+                let end = |node, none| Some(node).filter(|node| self.graph.constant(*node) != Some(none));
+                let (low, high) = (end(low.node, f64::NEG_INFINITY), end(high.node, f64::INFINITY));
                 let value = value.node;
                 let comparison = Comparison { text: String::new(), value, low, high, strict: false, unit };
                 self.compared(at_x, comparison);
