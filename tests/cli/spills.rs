@@ -162,3 +162,35 @@ fn a_thing_that_a_grip_barely_bears_is_carried_more_slowly() {
     let weak = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
     assert!(weak.code == 1 && weak.out.contains("grip-too-weak"), "{}", weak.out);
 }
+
+#[test]
+fn a_vessel_wider_than_its_lip_is_held_clear_of_the_rim_that_it_leans_over() {
+    // Its outside: 17.5 mm at the lip, 132 mm high, and 41 mm from 15 mm down. Of what is within 35 mm behind the lip the lowest is on the wall
+    // between (17.5, 103) and (41, 15), or on that below; at 80 deg it is the neck's.
+    let low = |tilt: f64| {
+        let (sin, cos) = tilt.to_radians().sin_cos();
+        let outline = [[41.0, 0.0], [41.0, 15.0], [17.5, 103.0], [17.5, 132.0]];
+        let turned = |share: f64, pair: &[[f64; 2]]| {
+            let [r, z] = [0, 1].map(|k| pair[0][k] + (pair[1][k] - pair[0][k]) * share);
+            let (out, down) = (r - 17.5, 132.0 - z);
+            [out * cos - down * sin, down * cos + out * sin]
+        };
+        let points = outline.windows(2).flat_map(|pair| (0..=2000).map(|i| turned(f64::from(i) / 2000.0, pair)));
+        points.filter(|p| p[0] >= -35.0).map(|p| p[1]).fold(0.0, f64::max)
+    };
+    let asks = |tilt: f64| {
+        format!("expect droop(source, {tilt} deg, 35 mm) in {:.3} mm .. {:.3} mm", low(tilt) - 0.1, low(tilt) + 0.1)
+    };
+    let steps: Vec<String> = [5.0, 20.0, 30.0, 50.0, 80.0].map(asks).to_vec();
+    let flask = |volume: &str, steps: &str| {
+        let text = bench("", "Beaker250mL", volume, "use std::glassware::Erlenmeyer250mL", steps);
+        text.replace("source = Beaker250mL", "source = Erlenmeyer250mL")
+    };
+    let dir = folder("spills_droop");
+    write(&dir, "law.mtx", flask("100 mL", &steps.join("\n    ")));
+    let law = matterixc_in(&dir, &["run", "law.mtx"]);
+    assert_eq!(law.code, 0, "{}{}", law.out, law.err);
+    // A third of a flask of 310 mL comes to its lip at low tilts.
+    let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
+    judged("spills_flask", &flask("250 mL", pour));
+}

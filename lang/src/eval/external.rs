@@ -66,6 +66,8 @@ enum Bound {
     Kept,
     /// The tilt at which a volume comes to the lip of a vessel.
     Brink,
+    /// How far below its lip a tilted vessel reaches.
+    Droop,
     /// A number that a material states; without end where it states none.
     Stated,
     /// What the lab placed the instance on, by one of these prepositions.
@@ -93,6 +95,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
     ("displacement", Bound::Displacement),
+    ("droop", Bound::Droop),
     ("footing", Bound::Footing),
     ("grouped", Bound::Grouped),
     ("having", Bound::Having),
@@ -230,10 +233,14 @@ impl Elaborator<'_> {
             (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
             (Bound::Grouped, [Value::List(items), Value::Num(n)]) => self.grouped(items, n.node, at),
             (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
+            (Bound::Displacement, [Value::Frame(a, from), Value::Frame(b, to)]) => {
+                self.between_frames((*a, from), (*b, to))
+            }
             (Bound::Footing, [Value::Instance(thing), Value::Instance(on)]) => self.footings(*thing, *on),
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Kept, [Value::Instance(i), Value::Num(tilt)]) => self.kept(*i, tilt),
             (Bound::Brink, [Value::Instance(i), Value::Num(volume)]) => self.brink(*i, volume),
+            (Bound::Droop, [Value::Instance(i), Value::Num(tilt), Value::Num(behind)]) => self.droop(*i, tilt, behind),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),

@@ -89,6 +89,18 @@ impl Elaborator<'_> {
         Value::Tuple((0..3).map(|axis| self.number(far(axis), length.clone(), false)).collect())
     }
 
+    /// How far right, back and up one frame of a thing is from another, in the axes of the thing, m; infinitely far for frames of different
+    /// things, and for those of parts that move apart.
+    pub fn between_frames(&mut self, (a, from): (InstanceId, &str), (b, to): (InstanceId, &str)) -> Value {
+        let frames = self.geometry(a).frames;
+        let place = |name: &str| frames.iter().find(|f| f.name == name && !f.stand);
+        let known = place(from).zip(place(to)).filter(|(from, to)| a == b && from.link == to.link);
+        let (from, to) = known.map(|(from, to)| (from.pose.position, to.pose.position)).unzip();
+        let length = self.tables.units.named("Length");
+        let far = |axis: usize| from.zip(to).map_or(f64::INFINITY, |(from, to)| to[axis] - from[axis]);
+        Value::Tuple((0..3).map(|axis| self.number(far(axis), length.clone(), false)).collect())
+    }
+
     /// An element of a list in words, where it has a name.
     pub fn spoken(&self, value: &Value) -> Option<String> {
         match value {
