@@ -194,3 +194,33 @@ fn a_vessel_wider_than_its_lip_is_held_clear_of_the_rim_that_it_leans_over() {
     let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
     judged("spills_flask", &flask("250 mL", pour));
 }
+
+#[test]
+fn a_capacity_beyond_the_inside_and_an_inside_beyond_the_outside_are_found_where_they_are_declared() {
+    let dir = folder("spills_declared");
+    let declared = |fields: &str| {
+        write(
+            &dir,
+            "ware.mtx",
+            format!("mtx 1\nuse std::glassware::Beaker250mL\nasset Ware: Beaker250mL {{ {fields} }}\n"),
+        );
+        let check = matterixc_in(&dir, &["check", "--no-cache", "ware.mtx"]);
+        (check.code, check.out)
+    };
+    let (code, said) = declared("max_volume: 400 mL");
+    assert!(
+        code == 1 && said.contains("`max_volume` cannot be 400 mL") && said.contains("at most 325.26 mL"),
+        "{said}"
+    );
+    assert_eq!(declared("max_volume: 322 mL").0, 0);
+    let outside = "[(0, 0) mm, (35, 0) mm, (35, 95) mm]";
+    for (inside, words) in [
+        ("[(0, 2) mm, (36, 2) mm, (36, 95) mm]", "it is 36 mm wide from the middle, the outside 35 mm"),
+        ("[(0, 2) mm, (33, 2) mm, (33, 96) mm]", "it has a point at a height of 96 mm, where the outside has none"),
+    ] {
+        let (code, said) = declared(&format!("shape: turned({outside}, {inside})"));
+        assert!(code == 1 && said.contains("sticks out of its outside") && said.contains(words), "{said}");
+    }
+    // A vessel whose inside is not known may say what it likes.
+    assert_eq!(declared("max_volume: 400 mL, shape: cylinder(70 mm, 95 mm)").0, 0);
+}

@@ -2,6 +2,7 @@
 //!
 //! All of it follows from shapes and frames; where nothing is known of a shape, nothing is said.
 
+use crate::outline::radius_at;
 use crate::pose::Pose;
 use crate::scene::{Frame, Shape, Solid, frame};
 
@@ -97,7 +98,7 @@ fn across(shape: &Shape, at: Pose) -> Option<f64> {
         }
         Shape::Cylinder([d, _]) => d / 2.0,
         Shape::Sphere(d) => (d * d / 4.0 - (z - d / 2.0).powi(2)).max(0.0).sqrt(),
-        Shape::Turned { outside, .. } => radius_at(outside, z),
+        Shape::Turned { outside, .. } => radius_at(outside, z).unwrap_or(0.0),
         Shape::Mesh(_) => return None,
     };
     if x.hypot(y) > radius + near {
@@ -108,19 +109,6 @@ fn across(shape: &Shape, at: Pose) -> Option<f64> {
         // Along a slant the whole of it counts.
         false => dx.hypot(dy) * width + dz * height,
     })
-}
-
-/// The greatest radius of an outline at a height, m.
-fn radius_at(outline: &[[f64; 2]], z: f64) -> f64 {
-    let between = |pair: &[[f64; 2]]| {
-        let ([r, low], [s, high]) = (pair[0], pair[1]);
-        match high - low {
-            _ if z < low || z > high => None,
-            0.0 => Some(r.max(s)),
-            step => Some(r + (s - r) * (z - low) / step),
-        }
-    };
-    outline.windows(2).filter_map(between).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ pub mod message;
 pub mod modbus;
 pub mod model;
 pub mod offer;
+pub mod outline;
 pub mod pages;
 pub mod plan;
 pub mod points;

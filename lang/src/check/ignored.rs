@@ -10,6 +10,7 @@ use crate::declare::fields::word;
 use crate::declare::tables::{MATTER, is_true};
 use crate::elaborate::lab::SYMMETRIC;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::free::Bound;
 use crate::eval::lab::given::{GIVEN_BY, INSTEAD, ONLY_WITH};
 use crate::eval::lab::properties::{GIVES, GIVES_AT};
 use crate::inventory::{COUNTS_AS, count_of};
@@ -22,7 +23,7 @@ pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
         Role::Extensive => ("an extensive quantity", &["unit", "scale", "hidden", ONLY_WITH, MATTER]),
         Role::Derived => ("a derived quantity", &["unit", "hidden", INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
-        Role::Param => ("a parameter", &["above", "at_least", GIVEN_BY, GIVES, GIVES_AT]),
+        Role::Param => ("a parameter", &["above", "at_least", "at_most", GIVEN_BY, GIVES, GIVES_AT]),
         Role::Flow => ("a flow", &[]),
         Role::Part => ("a part", &[]),
     };
@@ -67,7 +68,10 @@ pub fn matter(
 
 /// Options of a function that mean nothing: it may be bounded, and one of two things symmetric.
 pub fn function(parameters: usize, given: &[NamedExpr]) -> Vec<Diagnostic> {
-    let known: &[&str] = if parameters == 2 { &["above", "at_least", SYMMETRIC] } else { &["above", "at_least"] };
+    let known: &[&str] = match parameters {
+        2 => &["above", "at_least", "at_most", SYMMETRIC],
+        _ => &Bound::WORDS,
+    };
     let truths = given.iter().filter(|o| o.name.text == SYMMETRIC && parameters == 2);
     let wrong =
         truths.filter(|o| !matches!(&*o.value.kind, ExprKind::Name(n) if matches!(n.text.as_str(), "true" | "false")));

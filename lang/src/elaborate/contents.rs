@@ -5,6 +5,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 use crate::ast::{Binary, Expr, ExprKind, Name};
 use crate::declare::SpeciesId;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::free::Bound;
 use crate::eval::lab::held::Held;
 use crate::eval::lab::substances::Substance;
 use crate::eval::{Num, Scope, Value};
@@ -67,7 +68,7 @@ impl<'a> Elaborator<'a> {
                     return;
                 }
                 let n = self.name_param(&format!("{owner}.initial[{}]", name.text), n, quantity.span);
-                self.open.bound(self.graph.op(n.node), 0.0, false);
+                self.open.bound(self.graph.op(n.node), Bound::AtLeast, 0.0);
                 let amounts = self.amounts_of(&substance, n.clone(), quantity.span, name);
                 self.held.push(Held {
                     mixture: None,

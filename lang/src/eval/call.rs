@@ -322,7 +322,7 @@ impl<'a> Elaborator<'a> {
             Some((ty, options, m)) => {
                 let ty = self.resolve_type(ty, m);
                 let v = self.coerce(v, &ty, value.span, name);
-                self.check_limits(&v, value.span, name, &ty, options, m);
+                self.check_limits(&v, value.span, name, &ty, options, (None, m));
                 v
             }
             // A relation that a lab declares.

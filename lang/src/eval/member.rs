@@ -13,6 +13,7 @@ use crate::declare::Tables;
 use crate::declare::tables::MemberRef;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::Mode;
+use crate::eval::lab::free::Bound;
 use crate::eval::lab::grids::Place;
 use crate::eval::lab::instances::Setting;
 use crate::eval::lab::written::GEOMETRY;
@@ -368,7 +369,7 @@ impl<'a> Elaborator<'a> {
             if let Some(setting) = setting {
                 let value = self.param(id, &name.text, &ty, setting);
                 if let FieldValue::Expr(at) = setting.value() {
-                    self.check_limits(&value, at.span, &name.text, &ty, options, m.module);
+                    self.check_limits(&value, at.span, &name.text, &ty, options, (Some(id), m.module));
                 }
                 return value;
             }
@@ -399,7 +400,8 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// `{ above: 0 J/K }`, `{ at_least: 0 W }`: what a parameter may be.
+    /// `{ above: 0 J/K }`, `{ at_least: 0 W }`, `{ at_most: payload }`: what a parameter may be; members of the thing it belongs to may be
+    /// named.
     pub fn check_limits(
         &mut self,
         value: &Value,
@@ -407,27 +409,31 @@ impl<'a> Elaborator<'a> {
         name: &str,
         ty: &Type,
         options: &'a [NamedExpr],
-        module: usize,
+        (this, module): (Option<InstanceId>, usize),
     ) {
         let Value::Num(n) = value else { return };
         let Some(given) = self.glance(n.node) else { return };
-        for o in options.iter().filter(|o| matches!(o.name.text.as_str(), "above" | "at_least")) {
-            let v = self.expr(&o.value, &mut Scope::module(module));
+        for o in options {
+            let Some(bound) = Bound::of(&o.name.text) else { continue };
+            let mut scope = this.map_or_else(|| Scope::module(module), |id| Scope::of(id, module));
+            let v = self.expr(&o.value, &mut scope);
+            // What has no limit here holds.
+            if v == Value::Unlimited {
+                continue;
+            }
             let Value::Num(limit) = self.coerce(v, ty, o.value.span, &o.name.text) else { continue };
-            let Some(least) = self.glance(limit.node) else { continue };
-            let strict = o.name.text == "above";
-            self.open.bound(self.graph.op(n.node), least, strict);
-            if given > least || (!strict && given >= least) {
+            let Some(limit) = self.glance(limit.node) else { continue };
+            self.open.bound(self.graph.op(n.node), bound, limit);
+            if bound.holds(given, limit) {
                 continue;
             }
             let unit = self.unit_of(n);
-            let least = unit.show(least);
             self.report(
                 Diagnostic::error(
                     codes::OUT_OF_RANGE,
                     at,
                     format!("`{name}` cannot be {}", unit.show(given)),
-                    if strict { format!("must be above {least}") } else { format!("must be at least {least}") },
+                    format!("must be {} {}", bound.words(), unit.show(limit)),
                 )
                 .because(o.value.span, "its limit stands here"),
             );

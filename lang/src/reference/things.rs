@@ -5,6 +5,7 @@ use crate::ast::{AssetLine, Delay, Item, ItemKind, Member, MemberKind, Path, Rol
 use super::calls;
 use super::markdown::{cell, code, line, paragraphs, table};
 use super::{Library, Module};
+use crate::eval::lab::free::Bound;
 
 /// Names of capabilities or assets, with links to where they are declared.
 fn linked(library: &Library, module: &Module, paths: &[Path]) -> String {
@@ -84,7 +85,7 @@ fn value(library: &Library, module: &Module, member: &Member) -> Option<Vec<Stri
             let per = per.as_ref().map(|p| format!(" per {}", p.text)).unwrap_or_default();
             let of = shown(ty.span);
             let mut about = cell(&member.docs);
-            let bounds = options.iter().filter(|o| matches!(o.name.text.as_str(), "above" | "at_least"));
+            let bounds = options.iter().filter(|o| Bound::WORDS.contains(&o.name.text.as_str()));
             for bound in bounds {
                 let words = bound.name.text.replace('_', " ");
                 let space = if about.is_empty() { "" } else { " " };

@@ -8,7 +8,7 @@ use super::draws::{count, draw};
 use crate::ast::{Expr, FitLine, ItemKind, Name, StudyLine};
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
-use crate::eval::lab::free::Named;
+use crate::eval::lab::free::{Bound, Named};
 use crate::eval::{Num, Scope, Value};
 use crate::task::Task;
 
@@ -287,12 +287,11 @@ fn free<'a, 'f>(
         return None;
     }
     let unit = unit(lab, &low, &high);
-    if let Some((least, above)) = lab.open.least(named.param)
-        && (from < least || (above && from <= least))
-    {
-        let headline = format!("`{text}` cannot be {}", unit.show(from));
-        let least = unit.show(least);
-        let label = if above { format!("must be above {least}") } else { format!("must be at least {least}") };
+    let end = |bound: &Bound| if *bound == Bound::AtMost { to } else { from };
+    let beyond = |(bound, limit): &&(Bound, f64)| !bound.holds(end(bound), *limit);
+    if let Some((bound, limit)) = lab.open.bounds(named.param).iter().find(beyond).copied() {
+        let headline = format!("`{text}` cannot be {}", unit.show(end(&bound)));
+        let label = format!("must be {} {}", bound.words(), unit.show(limit));
         lab.report(Diagnostic::error(codes::OUT_OF_RANGE, range.span, headline, label));
         return None;
     }

@@ -9,6 +9,46 @@ use matterix_ir::{Graph, NodeId, Op, Span};
 use crate::eval::Num;
 use crate::units::Dimension;
 
+/// How a number is bounded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// `above`: more than that.
+    Above,
+    /// `at_least`: that or more.
+    AtLeast,
+    /// `at_most`: that or less.
+    AtMost,
+}
+
+impl Bound {
+    /// The options of a parameter, or of a function, that bound it.
+    pub const WORDS: [&str; 3] = ["above", "at_least", "at_most"];
+
+    /// What an option of this name says.
+    pub fn of(name: &str) -> Option<Self> {
+        let all = [Bound::Above, Bound::AtLeast, Bound::AtMost];
+        Bound::WORDS.iter().position(|word| *word == name).map(|at| all[at])
+    }
+
+    /// Whether a number is within it.
+    pub fn holds(self, given: f64, limit: f64) -> bool {
+        match self {
+            Bound::Above => given > limit,
+            Bound::AtLeast => given >= limit,
+            Bound::AtMost => given <= limit,
+        }
+    }
+
+    /// What a number must be, before the limit.
+    pub fn words(self) -> &'static str {
+        match self {
+            Bound::Above => "above",
+            Bound::AtLeast => "at least",
+            Bound::AtMost => "at most",
+        }
+    }
+}
+
 /// A parameter of the model by its name.
 #[derive(Clone, Debug)]
 pub struct Named {
@@ -28,8 +68,8 @@ pub struct FreeParameters {
     named: BTreeMap<String, Vec<Named>>,
     /// Parameters of the workflow that have no value before the runs.
     left: BTreeSet<String>,
-    /// The least value of a parameter, SI, and whether it must be above it.
-    least: BTreeMap<u32, (f64, bool)>,
+    /// What parameters may be, SI.
+    bounds: BTreeMap<u32, Vec<(Bound, f64)>>,
     whole: BTreeSet<u32>,
     /// Parameters by which something was decided. A lock: checks of one lab share it between threads.
     fixed: Mutex<BTreeSet<u32>>,
@@ -75,16 +115,16 @@ impl FreeParameters {
         self.left.contains(name)
     }
 
-    /// A parameter has a least value, SI.
-    pub fn bound(&mut self, op: Op, least: f64, above: bool) {
+    /// A parameter has a bound, SI.
+    pub fn bound(&mut self, op: Op, bound: Bound, limit: f64) {
         if let Op::Param(i) = op {
-            self.least.insert(i, (least, above));
+            self.bounds.entry(i).or_default().push((bound, limit));
         }
     }
 
-    /// The least value of a parameter, SI, and whether it must be above it.
-    pub fn least(&self, param: u32) -> Option<(f64, bool)> {
-        self.least.get(&param).copied()
+    /// What a parameter may be, SI.
+    pub fn bounds(&self, param: u32) -> &[(Bound, f64)] {
+        self.bounds.get(&param).map_or(&[], Vec::as_slice)
     }
 
     /// A parameter counts something.

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use matterix_ir::mesh::Mesh;
+use matterix_ir::outline::{radius_at, sticks_out};
+use matterix_ir::quantity::show_number;
 use matterix_ir::scene::{Frame, InstanceId, Pose, Shape, Solid, frame};
 use matterix_ir::{Diagnostic, Span, codes};
 
@@ -297,8 +299,13 @@ impl<'a> Elaborator<'a> {
             },
             "turned" => match args.as_slice() {
                 [outside, inside] => {
-                    let outside = self.outline(&outside.value, scope)?;
-                    Some(Shape::Turned { outside, inside: self.outline(&inside.value, scope)? })
+                    let (outside, within) = (self.outline(&outside.value, scope)?, inside.value.span);
+                    let inside = self.outline(&inside.value, scope)?;
+                    if let Some(point) = sticks_out(&outside, &inside) {
+                        self.sticks_out(point, &outside, within);
+                        return None;
+                    }
+                    Some(Shape::Turned { outside, inside })
                 }
                 _ => None,
             },
@@ -381,6 +388,23 @@ impl<'a> Elaborator<'a> {
             outside: vec![[0.0, 0.0], [r, 0.0], [r, h]],
             inside: vec![[0.0, floor], [hole, floor], [hole, h]],
         })
+    }
+
+    /// Reports an inside that is wider or taller than what is around it.
+    fn sticks_out(&mut self, [r, z]: [f64; 2], outside: &[[f64; 2]], span: Span) {
+        let mm = |v: f64| show_number((v * 1e6).round() / 1e3);
+        let label = match radius_at(outside, z) {
+            Some(around) => format!(
+                "at a height of {} mm it is {} mm wide from the middle, the outside {} mm",
+                mm(z),
+                mm(r),
+                mm(around)
+            ),
+            None => format!("it has a point at a height of {} mm, where the outside has none", mm(z)),
+        };
+        let headline = "the inside of this shape sticks out of its outside";
+        let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, label);
+        self.report(d.help("points are a radius, half the diameter, and a height; the outside comes first"));
     }
 
     /// Points of radius and height, m, no radius below 0, from the bottom up.

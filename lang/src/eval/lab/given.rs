@@ -246,7 +246,7 @@ impl<'a> Elaborator<'a> {
         let mut scope = Scope { lab: true, ..Scope::module(module) };
         let value = self.within_lab(&within, |this| this.typed(e, ty, &mut scope, "at"));
         let value = self.as_param(id, &name.text, ty, value, e.span);
-        self.check_limits(&value, e.span, "at", ty, options, m.module);
+        self.check_limits(&value, e.span, "at", ty, options, (Some(id), m.module));
         Some(value)
     }
 

@@ -82,7 +82,7 @@ impl<'a> Elaborator<'a> {
             return Value::Error;
         }
         let limits = self.diagnostics.len();
-        self.check_limits(&value, e.span, &what, &ty, options, m.module);
+        self.check_limits(&value, e.span, &what, &ty, options, (None, m.module));
         if self.diagnostics.len() > limits { Value::Error } else { value }
     }
 
