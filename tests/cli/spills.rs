@@ -224,3 +224,26 @@ fn a_capacity_beyond_the_inside_and_an_inside_beyond_the_outside_are_found_where
     // A vessel whose inside is not known may say what it likes.
     assert_eq!(declared("max_volume: 400 mL, shape: cylinder(70 mm, 95 mm)").0, 0);
 }
+
+#[test]
+fn a_handler_for_what_a_motion_fails_with_is_no_dead_one() {
+    let dir = folder("spills_handled");
+    let handled = |steps: &str, name: &str| {
+        let steps = format!("sequence {{\n        {steps}\n    }} on {name} {{ note \"so it is\" }}");
+        write(&dir, "bench.mtx", bench("", "Beaker250mL", "200 mL", OWN, &steps));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        (check.code, check.out + &check.err)
+    };
+    for name in ["spilled", "collision", "no_way", "unreachable", "too_wide", "unmovable"] {
+        let (code, said) = handled("pick source by panda\n        put back source by panda", name);
+        assert!(code == 0 && !said.contains("dead-branch"), "{name}: {said}");
+    }
+    let (_, said) = handled("wait 1 s", "spilled");
+    assert!(said.contains("nothing before it fails with `spilled`"), "{said}");
+    // The handler takes it in a run, and what it does is looked at.
+    let steps = "pick source by panda\n    sequence { lean source at target by panda } on spilled { note \"ran over\" }\n    \
+                 level source at target by panda\n    put back source by panda";
+    write(&dir, "run.mtx", bench("", "Beaker250mL", "200 mL", OWN, steps));
+    let run = matterixc_in(&dir, &["run", "run.mtx", "--fidelity", "motion", "--out", "out"]);
+    assert!(run.out.contains("ran over") || run.err.contains("ran over"), "{}{}", run.out, run.err);
+}

@@ -267,6 +267,12 @@ pub enum Motion {
 }
 
 impl Motion {
+    /// What a motion that cannot be carried out fails with.
+    pub const FAILURES: [&str; 8] =
+        ["collision", "missed", "no_way", "slip", "spilled", "too_wide", "unmovable", "unreachable"];
+    /// What any step fails with during which a part that moves by itself runs into something, or a vessel in hand is filled over its rim.
+    pub const FAILURES_BESIDE: [&str; 2] = ["collision", "spilled"];
+
     /// The robot that moves.
     pub fn mover(&self) -> InstanceId {
         match self {

@@ -4,7 +4,7 @@ use std::cell::LazyCell;
 use std::collections::BTreeSet;
 
 use matterix_ir::model::Event;
-use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
+use matterix_ir::plan::{Caught, Motion, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Diagnostic, Op, Span, codes};
 
 use crate::ast::{ItemKind, WireKind};
@@ -137,7 +137,8 @@ fn takes_time(plan: &Plan, root: StepId) -> bool {
 
 /// All that a step may fail with; without what only devices report, where those do what they are told.
 pub(super) fn raised(plan: &Plan, root: StepId, devices: bool) -> BTreeSet<String> {
-    Raising { plan, devices, awaited: BTreeSet::new() }.of(root)
+    let moves = plan.steps.iter().any(|step| matches!(&step.step, Step::Operation(o) if o.motion.is_some()));
+    Raising { plan, devices, moves, awaited: BTreeSet::new() }.of(root)
 }
 
 /// Goes through what steps fail with.
@@ -145,6 +146,8 @@ struct Raising<'p> {
     plan: &'p Plan,
     /// What only devices report counts.
     devices: bool,
+    /// Robots move in it.
+    moves: bool,
     /// Bodies of jobs that were waited for.
     awaited: BTreeSet<StepId>,
 }
@@ -177,6 +180,12 @@ impl Raising<'_> {
             }
             Step::Operation(o) => {
                 o.fails.iter().filter(|_| devices).for_each(|name| add(name));
+                let by_motion: &[&str] = match &o.motion {
+                    Some(_) => &Motion::FAILURES,
+                    None if self.moves => &Motion::FAILURES_BESIDE,
+                    None => &[],
+                };
+                by_motion.iter().filter(|_| devices).for_each(|name| add(name));
                 o.needs.iter().for_each(|need| add(need.failure()));
                 o.limits.iter().filter_map(|i| plan.limits.get(*i as usize)).for_each(|l| add(l.condition.failure()));
                 add("claimed");

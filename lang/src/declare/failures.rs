@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use matterix_ir::plan::Motion;
+
 use super::fields::word;
 use crate::ast::{self, Clause, ClauseKind, ItemKind, MemberKind};
 use crate::names::Names;
@@ -31,7 +33,7 @@ pub fn dangers(names: &Names<'_>) -> BTreeSet<String> {
 
 /// Every failure that something declares or the executor raises.
 pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
-    let mut out: BTreeSet<String> = FAILURES.map(String::from).into();
+    let mut out: BTreeSet<String> = FAILURES.into_iter().chain(Motion::FAILURES).map(String::from).collect();
     out.extend(dangers(names));
     let add = |clauses: &[Clause], out: &mut BTreeSet<String>| {
         for c in clauses {

@@ -2,7 +2,7 @@
 //! `finally` behind them do is looked at beside it. What goes wrong there goes wrong on some ways only, and nothing of
 //! it is known afterwards.
 
-use matterix_ir::plan::{Caught, Operation, Step, StepId};
+use matterix_ir::plan::{Caught, Motion, Operation, Step, StepId};
 
 use super::state::AbstractState;
 use super::value::Imprecision;
@@ -13,9 +13,11 @@ impl Interpreter<'_, '_> {
     pub fn may_report(&mut self, operation: &Operation, facts: &AbstractState) {
         let Some(open) = self.reported.last_mut() else { return };
         open.extend(operation.fails.iter().map(|name| (name.clone(), facts.clone())));
-        // What must not be may come about at any step: it is followed where somebody has thought of it.
+        // What must not be may come about at any step, and any motion may not be possible: that is followed where somebody has
+        // thought of it.
         let named = self.caught.iter().flatten().flatten();
-        let dangers = named.filter(|name| self.lab.tables.dangers().contains(*name));
+        let by_motion = |name: &str| operation.motion.is_some() && Motion::FAILURES.contains(&name);
+        let dangers = named.filter(|name| self.lab.tables.dangers().contains(*name) || by_motion(name));
         open.extend(dangers.map(|name| (name.clone(), facts.clone())));
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use matterix_ir::plan::{Caught, Operation, Plan, Step, StepId};
+use matterix_ir::plan::{Caught, Motion, Operation, Plan, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{FileId, NodeId, Span};
 
@@ -236,6 +236,8 @@ impl Build<'_> {
     fn operation(&mut self, id: StepId, operation: &Operation, at: usize) -> usize {
         operation.needs.iter().for_each(|need| self.raise(need.failure(), at));
         operation.fails.iter().chain([&"claimed".to_owned()]).for_each(|name| self.raise(name, at));
+        let by_motion = Motion::FAILURES.into_iter().filter(|_| operation.motion.is_some());
+        by_motion.for_each(|name| self.raise(name, at));
         let outer = self.held.clone();
         let mut held = (*outer).clone();
         held.extend(operation.claims.iter().map(|i| (*i, id)));
