@@ -247,3 +247,35 @@ fn a_handler_for_what_a_motion_fails_with_is_no_dead_one() {
     let run = matterixc_in(&dir, &["run", "run.mtx", "--fidelity", "motion", "--out", "out"]);
     assert!(run.out.contains("ran over") || run.err.contains("ran over"), "{}{}", run.out, run.err);
 }
+
+#[test]
+fn pouring_nothing_or_less_and_pouring_from_an_empty_vessel_are_refused_in_words() {
+    let dir = folder("spills_nothing");
+    let pour = |amount: &str| {
+        format!("let m <- pour {amount} from source into target by panda using scale {{ tolerance: 1 g }}")
+    };
+    let tilt = |amount: &str| {
+        format!(
+            "pick source by panda\n    tip source into target by panda\n    \
+             tilt source into target by panda {{ amount: {amount} }}\n    put back source by panda"
+        )
+    };
+    let cases = [
+        ("100 mL", pour("0 g"), "0 g are to be poured"),
+        ("100 mL", pour("-5 g"), "-5 g are to be poured"),
+        ("100 mL", tilt("0 g"), "0 g are to be poured"),
+        ("0 mL", pour("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
+        ("0 mL", tilt("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
+    ];
+    for (volume, steps, said) in cases {
+        write(&dir, "bench.mtx", bench("", "Beaker250mL", volume, "", &steps).replace(" holding 0 mL of water", ""));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        assert!(check.code == 1 && check.out.contains(said), "{steps}: {}{}", check.out, check.err);
+    }
+    // What is poured may be known in the run only.
+    let steps = "pick source by panda\n    tip source into target by panda\n    let left = scale.net\n    \
+                 tilt source into target by panda { amount: left - left }\n    put back source by panda";
+    write(&dir, "bench.mtx", bench("", "Beaker250mL", "100 mL", "", steps));
+    let run = matterixc_in(&dir, &["run", "bench.mtx"]);
+    assert!(run.code != 0 && (run.out + &run.err).contains("0 g are to be poured"));
+}
