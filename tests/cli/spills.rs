@@ -279,3 +279,37 @@ fn pouring_nothing_or_less_and_pouring_from_an_empty_vessel_are_refused_in_words
     let run = matterixc_in(&dir, &["run", "bench.mtx"]);
     assert!(run.code != 0 && (run.out + &run.err).contains("0 g are to be poured"));
 }
+
+/// A lab with a tray of 150 g, a beaker of 50 mL on it, and a mat; the fingers bear the tray by this friction.
+fn tray(arm: &str, volume: &str, friction: f64, steps: &str) -> String {
+    format!(
+        "mtx 1\nuse std::glassware::Beaker50mL\nuse std::robots::{{FrankaHand, FrankaPanda}}\n\
+         asset Tray: Surface, Graspable {{\n    mass: 150 g\n    friction: {friction}\n    spots: 4\n    shape: box(60 mm, 200 mm, 10 mm)\n    \
+         solid box(20 mm, 20 mm, 100 mm) at (0, 0, 10) mm\n    frame grasp at (0, 0, 90) mm\n    frame place at (0, 60, 10) mm\n}}\n\
+         asset Mat: Surface {{\n    mass: 1 kg\n    shape: box(250 mm, 250 mm, 10 mm)\n}}\nlab bench {{\n    ambient: 22 degC\n    \
+         table = OpticalTable at (0, 0, 0) m\n    arm = FrankaPanda {{ gripper: FrankaHand {{}} {arm} }} on table at (0, 0) mm\n    \
+         tray = Tray on table at (450, -200) mm\n    mat = Mat on table at (450, 250) mm\n    \
+         cup = Beaker50mL on tray{volume}\n}}\nworkflow run in bench {{\n    {steps}\n}}\n"
+    )
+}
+
+#[test]
+fn what_stands_on_a_tray_is_carried_as_carefully_as_what_is_in_hand() {
+    let way = |name: &str, arm: &str, volume: &str| {
+        let text = tray(arm, volume, 0.5, "place tray on mat by arm");
+        lasted(&judged(name, &text), "move arm to mat.pre_place")
+    };
+    let (full, empty) = (way("spills_tray_full", "", " holding 68 mL of water"), way("spills_tray_empty", "", ""));
+    let spilling = way("spills_tray_allowed", ", may_spill: true", " holding 68 mL of water");
+    assert!(full > 2.0 * empty && spilling == empty, "{full} s full, {empty} s empty, {spilling} s if it may spill");
+    // The hand presses with 70 N: 0.014 bear 1.96 N. The tray weighs 1.47 N, with the full beaker 2.4 N.
+    let dir = folder("spills_tray_weak");
+    let check = |volume: &str| {
+        write(&dir, "bench.mtx", tray("", volume, 0.014, "place tray on mat by arm"));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        (check.code, check.out)
+    };
+    assert_eq!(check("").0, 0);
+    let (code, said) = check(" holding 68 mL of water");
+    assert!(code == 1 && said.contains("error[grip-too-weak]") && said.contains("weighs 2.4 N"), "{said}");
+}

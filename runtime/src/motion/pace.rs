@@ -50,6 +50,7 @@ impl Burden {
         let borne = value(load.taxed).filter(|taxed| *taxed > 0.0).map(f64::recip);
         Burden { loose: value(load.loose), borne }
     }
+
 }
 
 /// How a thing is moved, evenly in time: the way of a point of it, its axis, and the way of its centre of mass.
@@ -134,8 +135,11 @@ impl Ride {
     }
 }
 
-/// The acceleration at a place of a way; it rests before and after.
+/// The acceleration at a place of a way; it rests before and after, and on a way that takes no time.
 fn felt(way: &[[f64; 3]], index: usize, dt: f64) -> [f64; 3] {
+    if dt <= 0.0 {
+        return [0.0; 3];
+    }
     let at = |i: usize| way[i.min(way.len() - 1)];
     let (before, here, after) = (at(index.saturating_sub(1)), at(index), at(index + 1));
     [0, 1, 2].map(|k| (after[k] - 2.0 * here[k] + before[k]) / (dt * dt))
@@ -167,8 +171,8 @@ impl Stage<'_> {
         self.burdens = burdens.into_iter().collect();
     }
 
-    /// A motion that has been planned and not begun yet, as slow as what the robot holds needs; refused where that does not help. Of what
-    /// pours, or is set upright again where it has poured, contents may run out.
+    /// A motion that has been planned and not begun yet, as slow as what the robot holds, and what stands on that, needs; refused where that
+    /// does not help. Of what pours, or is set upright again where it has poured, contents may run out.
     pub(super) fn calmed(
         &mut self,
         before: &Stage<'_>,
@@ -178,61 +182,90 @@ impl Stage<'_> {
         let Some(held) = before.held(performed.robot).filter(|held| self.held(performed.robot) == Some(*held)) else {
             return Ok(performed);
         };
-        let Some(Burden { loose, borne }) = self.burdens.get(&held).copied() else { return Ok(performed) };
-        let shape = self.scene.get(held).shape.as_ref();
-        let filled = shape
-            .zip(loose)
-            .and_then(|(shape, volume)| Filled::of(shape, volume, |inside| self.tilts.of(held, inside)));
-        if filled.is_none() && borne.is_none() {
-            return Ok(performed);
-        }
-        let mut ride = before.ride(&performed, held, filled.as_ref().map_or(0.0, |filled| filled.surface));
-        let borne = borne.unwrap_or(f64::INFINITY);
-        if borne < GRAVITY {
-            return Err(Refused::Slips(held, borne));
-        }
-        let slow = times(1.0, |times| (ride.pull(times) - GRAVITY) * MARGIN + GRAVITY > borne);
-        let Some(filled) = filled else { return Ok(performed.paced((slow, 0.0))) };
-        let (mut wave, since) = before.waves.get(&held).copied().unwrap_or_default();
-        wave.follow([0.0; 2], filled.frequency, (before.now - since).max(0.0));
-        match motion {
+        let slow = match self.burdens.get(&held).and_then(|burden| burden.borne) {
+            Some(borne) if borne < GRAVITY => return Err(Refused::Slips(held, borne)),
+            Some(borne) => {
+                let ride = before.ride(&performed, held, 0.0);
+                times(1.0, |times| (ride.pull(times) - GRAVITY) * MARGIN + GRAVITY > borne)
+            }
+            None => 1.0,
+        };
+        let vessels = self.vessels(before, &performed);
+        if let Motion::Tilted { within: Some(_), about: (source, _), .. } = motion {
             // It is brought there first; what runs out then does not run into the target.
-            Motion::Tilted { within: Some(_), .. } => {
-                return Ok(self.poured(before, performed, (held, &filled, wave), slow));
-            }
-            Motion::Tilted { .. } if ride.is_set_upright() => ride.leave_out_pouring(),
-            _ => {
-                let lost = filled.lost(ride.own_tilt());
-                if lost > 0.0 {
-                    return Err(Refused::Spills(held, lost));
-                }
-            }
+            return self.poured(before, performed, *source, vessels, slow);
         }
-        let pace = filled.calm(&ride, wave, slow);
-        let wave = ride.swing(pace, wave, filled.frequency).wave;
-        self.waves.insert(held, (wave, before.now + performed.duration() * pace.0 + pace.1));
+        let mut cargo = Vec::new();
+        for (vessel, filled, wave) in vessels {
+            let mut ride = before.ride(&performed, vessel, filled.surface);
+            match motion {
+                Motion::Tilted { about: (source, _), .. } if *source == vessel && ride.is_set_upright() => {
+                    ride.leave_out_pouring();
+                }
+                _ => filled.keeps_in(vessel, &ride)?,
+            }
+            cargo.push(Cargo { vessel, filled, wave, ride });
+        }
+        let pace = calm(&cargo, slow);
+        let since = before.now + performed.duration() * pace.0 + pace.1;
+        self.rocked(&cargo, pace, since);
         Ok(performed.paced(pace))
     }
 
-    /// A motion whose last part pours, with the parts before it as slow as their contents need.
+    /// The vessels that a robot carries, the one in its hand first, with what is free to run out of each and the wave in it as a motion begins.
+    fn vessels(&self, before: &Stage<'_>, performed: &Performed) -> Vec<(InstanceId, Filled, Wave)> {
+        let robot = performed.robot;
+        let filled = |(vessel, burden): (&InstanceId, &Burden)| {
+            let filled = self.filled(*vessel, burden.loose?).filter(|_| before.held_by(*vessel) == Some(robot))?;
+            let (mut wave, since) = before.waves.get(vessel).copied().unwrap_or_default();
+            wave.follow([0.0; 2], filled.frequency, (before.now - since).max(0.0));
+            Some((*vessel, filled, wave))
+        };
+        let mut out: Vec<_> = self.burdens.iter().filter_map(filled).collect();
+        out.sort_by_key(|(vessel, ..)| before.held(robot) != Some(*vessel));
+        out
+    }
+
+    /// A vessel with so much in it, m3, as far as its inside is known.
+    pub(super) fn filled(&self, vessel: InstanceId, volume: f64) -> Option<Filled> {
+        let shape = self.scene.get(vessel).shape.as_ref()?;
+        Filled::of(shape, volume, |inside| self.tilts.of(vessel, inside))
+    }
+
+    /// A motion whose last part pours from a vessel, with the parts before it as slow as their contents need.
     fn poured(
         &mut self,
         before: &Stage<'_>,
         mut performed: Performed,
-        (held, filled, wave): (InstanceId, &Filled, Wave),
+        source: InstanceId,
+        vessels: Vec<(InstanceId, Filled, Wave)>,
         slow: f64,
-    ) -> Performed {
-        let last = performed.parts.pop();
-        let mut wave = wave;
-        if !performed.parts.is_empty() {
-            let ride = before.ride(&performed, held, filled.surface);
-            let pace = filled.calm(&ride, wave, slow);
-            wave = ride.swing(pace, wave, filled.frequency).wave;
-            performed = performed.paced(pace);
+    ) -> Result<Performed, Refused> {
+        for (vessel, filled, _) in vessels.iter().filter(|(vessel, ..)| *vessel != source) {
+            filled.keeps_in(*vessel, &before.ride(&performed, *vessel, filled.surface))?;
         }
-        self.waves.insert(held, (wave, before.now + performed.duration()));
+        let last = performed.parts.pop();
+        if performed.parts.is_empty() {
+            self.waves.extend(vessels.into_iter().map(|(vessel, _, wave)| (vessel, (wave, before.now))));
+            performed.parts.extend(last);
+            return Ok(performed);
+        }
+        let cargo = |(vessel, filled, wave): (InstanceId, Filled, Wave)| {
+            let ride = before.ride(&performed, vessel, filled.surface);
+            Cargo { vessel, filled, wave, ride }
+        };
+        let cargo: Vec<Cargo> = vessels.into_iter().map(cargo).collect();
+        let pace = calm(&cargo, slow);
+        performed = performed.paced(pace);
+        self.rocked(&cargo, pace, before.now + performed.duration());
         performed.parts.extend(last);
-        performed
+        Ok(performed)
+    }
+
+    /// Notes the waves that a motion leaves behind.
+    fn rocked(&mut self, cargo: &[Cargo], pace: Pace, since: f64) {
+        let left = cargo.iter().map(|c| (c.vessel, (c.ride.swing(pace, c.wave, c.filled.frequency).wave, since)));
+        self.waves.extend(left);
     }
 
     /// How a thing in hand is moved on a way that begins as things stand now.
@@ -266,20 +299,41 @@ impl Stage<'_> {
     }
 }
 
-impl Filled {
-    /// How much slower, and later, a motion goes that is at least so many times as long.
-    fn calm(&self, ride: &Ride, wave: Wave, least: f64) -> Pace {
-        let is_wild = |pace: Pace| {
-            let swing = ride.swing(pace, wave, self.frequency);
-            swing.steep > STEEP || self.lost(swing.across) > 0.0
-        };
-        // What is left of a wave from before dies out by itself only.
-        let mut wait = 0.0;
-        while wait < LONGEST && is_wild((SLOWEST.max(least), wait)) {
-            wait += WAIT;
-        }
-        (times(least, |times| is_wild((times, wait))), wait)
+/// A vessel that is carried: what is in it, the wave there as the motion begins, and the motion.
+struct Cargo {
+    vessel: InstanceId,
+    filled: Filled,
+    wave: Wave,
+    ride: Ride,
+}
+
+impl Cargo {
+    /// Whether something runs over on a motion of such a pace.
+    fn is_wild(&self, pace: Pace) -> bool {
+        let swing = self.ride.swing(pace, self.wave, self.filled.frequency);
+        swing.steep > STEEP || self.filled.lost(swing.across) > 0.0
     }
+}
+
+impl Filled {
+    /// Refuses a ride that is tilted so far that some of it runs over however slow that is.
+    fn keeps_in(&self, vessel: InstanceId, ride: &Ride) -> Result<(), Refused> {
+        match self.lost(ride.own_tilt()) {
+            lost if lost > 0.0 => Err(Refused::Spills(vessel, lost)),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// How much slower, and later, a motion goes that is at least so many times as long.
+fn calm(cargo: &[Cargo], least: f64) -> Pace {
+    let is_wild = |pace: Pace| cargo.iter().any(|cargo| cargo.is_wild(pace));
+    // What is left of a wave from before dies out by itself only.
+    let mut wait = 0.0;
+    while wait < LONGEST && is_wild((SLOWEST.max(least), wait)) {
+        wait += WAIT;
+    }
+    (times(least, |times| is_wild((times, wait))), wait)
 }
 
 #[cfg(test)]

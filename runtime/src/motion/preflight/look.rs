@@ -55,11 +55,11 @@ impl<'p, 's> Looker<'p, 's> {
         let model = &self.program.model;
         // What only a run can tell is left to the run.
         let Some(motion) = motion.chosen(|node| course.values.value(model, node)) else { return course.drifts(robot) };
-        let held = course.stage.held(robot);
-        let load = model.loads.iter().find(|load| held == Some(load.instance));
+        let carried = model.loads.iter().filter(|load| course.stage.held_by(load.instance) == Some(robot));
         let value = |node: Option<NodeId>| node.and_then(|node| course.values.value(model, node));
-        let burden = load.map(|load| Burden::of(load, value));
-        course.stage.burden(held.zip(burden.filter(|burden| *burden != Burden::default())));
+        let burdens = carried.map(|load| (load.instance, Burden::of(load, value)));
+        let burdens: Vec<_> = burdens.filter(|(_, burden)| *burden != Burden::default()).collect();
+        course.stage.burden(burdens);
         match &motion {
             Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),
             Motion::Free { item, on, .. } => self.free(course, &motion, robot, (*item, *on), site, beside),
