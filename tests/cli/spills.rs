@@ -313,3 +313,14 @@ fn what_stands_on_a_tray_is_carried_as_carefully_as_what_is_in_hand() {
     let (code, said) = check(" holding 68 mL of water");
     assert!(code == 1 && said.contains("error[grip-too-weak]") && said.contains("weighs 2.4 N"), "{said}");
 }
+
+#[test]
+fn a_beaker_filled_to_the_brim_is_poured_from_as_long_as_it_holds_its_contents() {
+    // The inside holds 322.0 mL: a tilt of 0.3 deg brings 321.5 mL to the lip.
+    let brim = "asset Brim: Beaker250mL { max_volume: 322 mL }";
+    let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
+    for volume in ["321.5 mL", "322 mL"] {
+        let text = bench("", "Beaker250mL", volume, brim, pour).replace("source = Beaker250mL", "source = Brim");
+        judged("spills_brim", &text);
+    }
+}

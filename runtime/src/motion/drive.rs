@@ -118,7 +118,7 @@ impl Stage<'_> {
         let within = match way {
             Way::Upright(within) => Some(within),
             // What stands upright in the hand stays so on the way.
-            Way::Free | Way::Straight => self.is_held_upright(robot).then_some(LEVEL),
+            Way::Free | Way::Straight => self.is_held_upright(robot).then(|| self.steady(robot).min(LEVEL)),
         };
         for place in self.places(robot, to, &drive).into_iter().take(PLACES) {
             self.refresh(EFFORT / 2);

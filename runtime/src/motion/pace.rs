@@ -27,6 +27,8 @@ const MARGIN: f64 = 1.1;
 const STEEP: f64 = PI / 6.0;
 /// A vessel that has poured and is set upright by so much, or by half, pours no more, rad.
 const RIGHTED: f64 = 0.15;
+/// What is carried upright tilts by no more than this share of what its contents allow.
+const STEADY: f64 = 0.9;
 /// A motion is made so many times as long at most.
 const SLOWEST: f64 = 30.0;
 /// How finely it is found how many times.
@@ -224,6 +226,13 @@ impl Stage<'_> {
         let mut out: Vec<_> = self.burdens.iter().filter_map(filled).collect();
         out.sort_by_key(|(vessel, ..)| before.held(robot) != Some(*vessel));
         out
+    }
+
+    /// How far what a robot carries may tilt before it runs over, with a tenth to spare, rad.
+    pub(super) fn steady(&self, robot: InstanceId) -> f64 {
+        let carried = self.burdens.iter().filter(|(id, _)| self.held_by(**id) == Some(robot));
+        let filled = carried.filter_map(|(id, burden)| self.filled(*id, burden.loose?));
+        filled.map(|filled| STEADY * filled.brink()).fold(f64::INFINITY, f64::min)
     }
 
     /// A vessel with so much in it, m3, as far as its inside is known.

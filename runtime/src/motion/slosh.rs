@@ -69,6 +69,18 @@ impl Filled {
         LITTLE * self.tilts.first().map_or(0.0, |p| p[1])
     }
 
+    /// How far it tilts before anything runs out, rad.
+    pub(super) fn brink(&self) -> f64 {
+        let full = self.tilts.first().map_or(0.0, |p| p[1]);
+        let volume = self.volume - SLACK * full;
+        let above = self.tilts.partition_point(|p| p[1] >= volume);
+        match (self.tilts.get(above.wrapping_sub(1)), self.tilts.get(above)) {
+            (Some([a, v]), Some([b, w])) => a + (b - a) * (v - volume) / (v - w),
+            (Some([a, _]), None) => *a,
+            _ => 0.0,
+        }
+    }
+
     /// How much runs out at a tilt, m3.
     pub(super) fn lost(&self, tilt: f64) -> f64 {
         let full = self.tilts.first().map_or(0.0, |p| p[1]);
@@ -170,6 +182,7 @@ mod tests {
         let filled = Filled::of(&beaker(), 200e-6, |inside| table(inside).into()).expect("water");
         // 200 of 322 mL: the surface reaches the lip at arctan(35.2 / 33.2) = 46.7 deg.
         assert_eq!(filled.lost(46.0_f64.to_radians()), 0.0);
+        assert!(filled.lost(filled.brink()) < 1e-12 && filled.lost(filled.brink() + 0.01) > 0.0);
         assert!(filled.lost(49.0_f64.to_radians()) > 5e-6);
     }
 }

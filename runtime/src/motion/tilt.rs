@@ -130,6 +130,7 @@ impl Stage<'_> {
         let is_begun = now >= LEVEL || ways.iter().any(|way| way.begun(now, tip).is_some());
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let (before, arm) = (actor.joints.clone(), actor.arm.clone());
+        let level = self.steady(robot).min(LEVEL);
         let mut refused = Refused::NoWay;
         let mut keep = |why: Refused| {
             if !matches!(refused, Refused::Collides(_)) {
@@ -139,7 +140,7 @@ impl Stage<'_> {
         for (way, begun, q) in self.nearest_first(robot, ways, is_begun.then_some(now), &mut keep) {
             let mut done = parts.clone();
             let brought = match begun {
-                None => self.way(robot, &arm, &q, Some(LEVEL)).map(|part| done.push(part)),
+                None => self.way(robot, &arm, &q, Some(level)).map(|part| done.push(part)),
                 Some(_) => Ok(()),
             };
             let poses = way.poses(begun, angle);
@@ -224,7 +225,7 @@ impl Stage<'_> {
 }
 
 /// The angle between a thing's z axis and up, rad.
-fn tilt_of(at: Pose) -> f64 {
+pub(super) fn tilt_of(at: Pose) -> f64 {
     let up = pose(&at).rotation.matrix()[(2, 2)];
     acos(up.clamp(-1.0, 1.0))
 }
