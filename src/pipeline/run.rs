@@ -4,11 +4,12 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use matterix_ir::plan::{Condition, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
-use matterix_runtime::motion::{Moment, Moved};
+use matterix_runtime::motion::{Burden, Moment, Moved};
 use matterix_runtime::process::{Engine, Observer, Options};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo, Sampler};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
@@ -171,6 +172,10 @@ impl Listener for Follower<'_, '_> {
 
     fn travels(&mut self, moments: &[Moment]) {
         self.recording.travels(moments);
+    }
+
+    fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {
+        self.recording.burdened(time, item, burden);
     }
 
     fn expectation(&mut self, result: &ExpectationResult) {

@@ -95,9 +95,9 @@ fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
     let steps = "pick source by panda\n    dash source into target by panda\n    level source at target by panda\n    put back source by panda";
     write(&dir, "bench.mtx", bench("", "Beaker250mL", "200 mL", OWN, steps));
     let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
-    assert_eq!(run.code, 0, "{}{}", run.out, run.err);
-    let verdict = matterixc_in(&dir, &["verify", "out"]);
-    assert!(verdict.code == 1 && verdict.out.contains("mL run over the rim of `source`"), "{}", verdict.out);
+    assert!(run.code != 0 && (run.out + &run.err).contains("`source` runs over in the hand of `panda`"));
+    let process = matterixc_in(&dir, &["run", "bench.mtx"]);
+    assert_eq!(process.code, 0, "{}{}", process.out, process.err);
 
     let steps = "pick source by panda\n    lean source at target by panda\n    level source at target by panda\n    put back source by panda";
     write(&dir, "lean.mtx", bench("", "Beaker250mL", "200 mL", OWN, steps));
@@ -323,4 +323,66 @@ fn a_beaker_filled_to_the_brim_is_poured_from_as_long_as_it_holds_its_contents()
         let text = bench("", "Beaker250mL", volume, brim, pour).replace("source = Beaker250mL", "source = Brim");
         judged("spills_brim", &text);
     }
+}
+
+/// A lab with a pump from a bottle to a beaker of 250 mL that an arm picks up.
+fn pumped(steps: &str) -> String {
+    format!(
+        "mtx 1\nuse std::glassware::{{Beaker250mL, Bottle500mL}}\nuse std::pumps::TubePump\n\
+         use std::robots::{{FrankaPanda, Robotiq2F85, WristXM540}}\nlab bench {{\n    ambient: 22 degC\n    \
+         table = OpticalTable at (0, 0, 0) m\n    \
+         panda = FrankaPanda {{ wrist: WristXM540 {{}}, gripper: Robotiq2F85 {{}} }} on table at (-400, 0) mm\n    \
+         stock = Bottle500mL on table at (-200, -300) mm holding 500 mL of water\n    \
+         source = Beaker250mL on table at (50, -200) mm holding 100 mL of water\n    \
+         pump = TubePump {{ source: stock, sink: source }} at (2, 0, 0) m\n}}\nworkflow run in bench {{\n    \
+         pick source by panda\n    {TIPPED}\n    {steps}\n}}\n"
+    )
+}
+
+/// The beaker in hand is tilted by 35 deg: it keeps 241.5 mL.
+const TIPPED: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 125 deg, 45 deg, 0 deg]";
+const UPRIGHT: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 90 deg, 45 deg, 0 deg]";
+
+/// The beaker in hand is tilted by 35 deg: it keeps 241.5 mL.
+const TIPPED: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 125 deg, 45 deg, 0 deg]";
+const UPRIGHT: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 90 deg, 45 deg, 0 deg]";
+
+#[test]
+fn a_vessel_that_is_filled_over_its_rim_in_a_hand_is_found_when_it_runs_over() {
+    let dir = folder("spills_filled");
+    write(
+        &dir,
+        "bench.mtx",
+        pumped(&format!("pump 180 mL at 60 mL/min by pump\n    {UPRIGHT}\n    put back source by panda")),
+    );
+    let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
+    assert!(run.code == 1 && run.out.contains("tilted by 35 deg, and it runs over"), "{}{}", run.out, run.err);
+    // 141.5 mL take as many seconds, from 3.3 s on.
+    let line = run.out.lines().find(|line| line.starts_with("Failure at ")).expect("a failure");
+    let time: f64 = line.trim_start_matches("Failure at ").trim_end_matches(" s").parse().expect("a time");
+    assert!((time - 144.8).abs() < 0.6, "{line}");
+    // Less of it stays in; and a handler may have the beaker set upright.
+    let little = format!("pump 130 mL at 60 mL/min by pump\n    {UPRIGHT}\n    put back source by panda");
+    judged("spills_filled_little", &pumped(&little));
+    let handled = format!(
+        "sequence {{ pump 180 mL at 60 mL/min by pump }} on spilled {{ {UPRIGHT}; wait 60 s }}\n    put back source by panda"
+    );
+    judged("spills_filled_handled", &pumped(&handled));
+    // Where nobody sets it upright the recording tells as well.
+    let left = "sequence { pump 180 mL at 60 mL/min by pump } on spilled { wait 60 s }";
+    write(&dir, "left.mtx", pumped(left));
+    matterixc_in(&dir, &["run", "left.mtx", "--fidelity", "motion", "--out", "left"]);
+    let verdict = matterixc_in(&dir, &["verify", "left"]);
+    assert!(verdict.code == 1 && verdict.out.contains("38.5 mL run over the rim of `source`"), "{}", verdict.out);
+}
+
+#[test]
+fn a_recording_that_ends_with_a_pour_is_judged_by_what_has_run_out() {
+    let steps = "pick source by panda\n    tip source into target by panda\n    \
+                 tilt source into target by panda { amount: 100 g }\n    wait 5 s";
+    let dir = folder("spills_last");
+    write(&dir, "bench.mtx", bench("", "Beaker250mL", "200 mL", "", steps));
+    matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
+    let verdict = matterixc_in(&dir, &["verify", "out"]);
+    assert!(verdict.code == 0 && verdict.out.contains("nothing wrong"), "{}", verdict.out);
 }

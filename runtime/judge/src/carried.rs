@@ -40,13 +40,18 @@ struct Filled<'f> {
 pub(crate) fn judge(film: &Trajectory, index: usize, wrong: &mut Vec<Wrong>) {
     let robot = &film.robots[index];
     for (place, grip) in robot.grips.iter().enumerate() {
-        let Some(&(item, inner)) = grip.items.first() else { continue };
         let until = robot.grips.get(place + 1).map_or(f64::INFINITY, |next| next.time);
         let moves = spans(robot, grip.time, until);
         let worst = |found: &mut dyn Iterator<Item = (Wrong, f64)>| found.max_by(|a, b| a.1.total_cmp(&b.1));
-        let spilled = worst(&mut moves.iter().filter_map(|span| film.spilled(robot, (item, inner), *span)));
-        let slipped = worst(&mut moves.iter().filter_map(|span| film.slipped(robot, (item, inner), *span)));
-        wrong.extend([spilled, slipped].into_iter().flatten().map(|(wrong, _)| wrong));
+        // What goes along may run over as what is gripped does.
+        for carried in &grip.items {
+            let moving = moves.iter().filter_map(|span| film.spilled(robot, *carried, *span));
+            let filled = film.overfilled(robot, *carried, [grip.time, until]);
+            wrong.extend(worst(&mut moving.chain(filled)).map(|(wrong, _)| wrong));
+        }
+        let Some(gripped) = grip.items.first() else { continue };
+        let slipped = worst(&mut moves.iter().filter_map(|span| film.slipped(robot, *gripped, *span)));
+        wrong.extend(slipped.map(|(wrong, _)| wrong));
     }
 }
 
@@ -139,6 +144,30 @@ impl Trajectory {
 }
 
 impl Trajectory {
+    /// The most that runs over of a thing in hand where what is in it is said to change, with what share of the vessel that is: however it got
+    /// there, a vessel keeps no more than its tilt lets it.
+    fn overfilled(
+        &self,
+        robot: &Robot,
+        (item, inner): (usize, Isometry),
+        [from, to]: [f64; 2],
+    ) -> Option<(Wrong, f64)> {
+        let thing = &self.things[item];
+        let Some(Shape::Turned { inside, .. }) = &thing.shape else { return None };
+        let full = kept(inside, 0.0);
+        let at = |(time, volume): (f64, f64)| {
+            let tip = *robot.links(time).get(robot.machine.tip as usize)?;
+            let placed = pose(&(tip * inner));
+            let head = placed.point([0.0, 0.0, 1.0]);
+            let tilt = angle([0, 1, 2].map(|k| head[k] - placed.position[k]), [0.0, 0.0, 1.0]);
+            let lost = volume - kept(inside, tilt);
+            let wrong = Wrong::Spills { item: thing.name.clone(), volume: lost, tilt, time };
+            (lost > SLACK * full).then_some((wrong, lost / full))
+        };
+        let said = thing.volumes().filter(|(time, _)| (from..to).contains(time));
+        said.filter_map(at).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// Whether the lowest point of a vessel's rim is above the mouth of another vessel.
     fn is_over_a_mouth(&self, item: usize, at: &Isometry, axis: [f64; 3], time: f64) -> bool {
         let rim = |thing: &Thing| match &thing.shape {

@@ -152,6 +152,11 @@ impl Thing {
         Some(self.burdens.get(after).map_or(*now, |(_, [next, _])| now.min(*next)))
     }
 
+    /// The volumes that were said to be free to run out of it, m3, each with when that was.
+    pub(crate) fn volumes(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.burdens.iter().map(|(time, [loose, _])| (*time, *loose))
+    }
+
     /// The acceleration, of gravity and of the motion, that the grip on it bears, m/s2.
     pub(crate) fn borne(&self, time: f64) -> f64 {
         let after = self.burdens.partition_point(|(t, _)| *t <= time);

@@ -43,6 +43,8 @@ struct Run {
     astray: f64,
     things: Vec<(Thing, [f64; 3])>,
     standing: Vec<Standing>,
+    /// More messages: topic, time, s, and what it says.
+    more: Vec<(&'static str, f64, Value)>,
 }
 
 impl Run {
@@ -82,6 +84,9 @@ impl Run {
                 json!({ "joints": [{ "name": "slide.x", "position": x, "velocity": v, "acceleration": a }] }),
             );
         }
+        for (topic, time, message) in &self.more {
+            push(topic, *time, message.clone());
+        }
         writer.finish().expect("an end");
         drop(writer);
         out.into_inner()
@@ -95,13 +100,21 @@ fn gently(time: f64) -> [f64; 3] {
 }
 
 fn wrong(law: fn(f64) -> [f64; 3], astray: f64, things: Vec<(Thing, [f64; 3])>) -> Vec<Wrong> {
-    judge(&Run { law, astray, things, standing: Vec::new() }.file()).expect("a verdict").wrong
+    judge(&Run { law, astray, things, standing: Vec::new(), more: Vec::new() }.file())
+        .expect("a verdict")
+        .wrong
 }
 
 #[test]
 fn a_gentle_motion_beside_things_is_right() {
     let post = thing("post", Shape::Box([0.02, 0.02, 0.5]));
-    let run = Run { law: gently, astray: 0.0, things: vec![(post, [0.25, 0.0615, 0.0])], standing: Vec::new() };
+    let run = Run {
+        law: gently,
+        astray: 0.0,
+        things: vec![(post, [0.25, 0.0615, 0.0])],
+        standing: Vec::new(),
+        more: Vec::new(),
+    };
     let verdict = judge(&run.file()).expect("a verdict");
     assert_eq!(verdict.wrong, []);
     let looked = &verdict.looked[0];
@@ -142,7 +155,8 @@ fn what_stands_in_something_from_the_start_is_found() {
     let met = |apart: f64, one: Standing, other: Standing| {
         let cube = |name| thing(name, Shape::Box([0.1; 3]));
         let things = vec![(cube("one"), [2.0, 0.0, 0.0]), (cube("other"), [2.0 + apart, 0.0, 0.05])];
-        let run = Run { law: gently, astray: 0.0, things, standing: vec![one, other] };
+        let run =
+            Run { law: gently, astray: 0.0, things, standing: vec![one, other], more: Vec::new() };
         judge(&run.file()).expect("a verdict").wrong
     };
     let (one, other) = (|| standing("one", &["table"], true), || standing("other", &["table"], true));
@@ -186,12 +200,53 @@ fn links_that_are_not_where_joints_put_them_are_found() {
     assert!(matches!(found.as_slice(), [Wrong::Astray { by, .. }] if (by - 1e-3).abs() < 1e-9), "{found:?}");
 }
 
+/// A tray on the sledge with a beaker of 322 mL on it, of which so much is said to be in it, mL, at these times.
+fn carried(law: fn(f64) -> [f64; 3], volumes: &[(f64, f64)]) -> Vec<Wrong> {
+    let (outside, inside) =
+        (vec![[0.0, 0.0], [0.035, 0.0], [0.035, 0.095]], vec![[0.0, 0.002], [0.0332, 0.002], [0.0332, 0.095]]);
+    let things = vec![
+        (thing("tray", Shape::Box([0.1, 0.1, 0.01])), [0.0, 0.0, 0.36]),
+        (thing("cup", Shape::Turned { outside, inside }), [0.0, 0.0, 0.37]),
+    ];
+    let mut more = vec![("/grips", 0.0, json!({ "robot": "slide", "items": ["tray", "cup"] }))];
+    let told = |(time, volume): &(f64, f64)| {
+        ("/burdens", *time, json!({ "item": "cup", "loose": volume * 1e-6, "borne": null }))
+    };
+    more.extend(volumes.iter().map(told));
+    let found = judge(&Run { law, astray: 0.0, things, standing: Vec::new(), more }.file())
+        .expect("a verdict")
+        .wrong;
+    found.into_iter().filter(|wrong| matches!(wrong, Wrong::Spills { .. })).collect()
+}
+
+#[test]
+fn what_stands_on_a_thing_in_hand_runs_over_as_that_does() {
+    // Half a metre in two seconds: up to 0.6 m/s2 tilt the level by 3.5 deg, and the wave twice as far; 310 mL keep to 3 deg, 250 to 30.
+    assert_eq!(carried(gently, &[(0.0, 250.0)]), []);
+    let found = carried(gently, &[(0.0, 310.0)]);
+    let [Wrong::Spills { item, .. }] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!(item, "cup");
+}
+
+#[test]
+fn a_vessel_that_is_filled_over_its_rim_while_it_stands_in_a_hand_is_found() {
+    fn still(_: f64) -> [f64; 3] {
+        [0.0; 3]
+    }
+    assert_eq!(carried(still, &[(0.0, 100.0), (1.0, 320.0)]), []);
+    let found = carried(still, &[(0.0, 100.0), (1.0, 330.0), (1.5, 320.0)]);
+    let [Wrong::Spills { item, volume, time, .. }] = found.as_slice() else { panic!("{found:?}") };
+    assert!(item == "cup" && (volume - 8e-6).abs() < 0.2e-6 && *time == 1.0, "{found:?}");
+}
+
 #[test]
 fn damaged_files_are_refused() {
     for bytes in [b"".as_slice(), b"hello", b"\x89MCAP0\r\n"] {
         assert!(judge(bytes).is_err());
     }
-    let whole = Run { law: gently, astray: 0.0, things: Vec::new(), standing: Vec::new() }.file();
+    let whole =
+        Run { law: gently, astray: 0.0, things: Vec::new(), standing: Vec::new(), more: Vec::new() }
+            .file();
     for length in (0..whole.len()).step_by(97) {
         let _ = judge(&whole[..length]);
     }

@@ -3,6 +3,7 @@
 //! Sequence, failure and resource handling are the executor's business and never a backend's, so that the simulator,
 //! the dry run and hardware obey the same plan in the same way.
 
+mod carried;
 pub mod dry;
 mod moments;
 pub mod noise;
@@ -139,6 +140,11 @@ pub trait Backend {
 
     /// Asks where an operation stands; one that has ended is forgotten.
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault>;
+
+    /// Whether something has come about by itself that fails the first operation that is asked for.
+    fn has_befallen(&self) -> bool {
+        false
+    }
 
     /// Abandons an operation, or withdraws a question.
     fn halt(&mut self, ticket: Ticket);

@@ -1,18 +1,19 @@
 //! The digital twin: operations act on the process engine and take their declared time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Load, Model};
 use matterix_ir::plan::{Motion, Operation, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Leaves, NodeId};
+use matterix_ir::{Leaves, NodeId, Op};
 
+use super::carried::{APART, Attendant, Overflow, Told};
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
-use crate::motion::{Burden, Refused, Stage, supported};
+use crate::motion::{Burden, Moment, Refused, Stage, supported};
 use crate::process::{Advance, Engine, Watch};
 
 /// What moves through space.
@@ -35,8 +36,12 @@ pub struct Sim<'m> {
     moments: Moments,
     running: BTreeMap<Ticket, Running>,
     started: u64,
-    /// What a part that moved by itself ran into, until an operation has failed of it.
-    swung: Option<String>,
+    /// What came about by itself, a failure's name and what it says, until an operation has failed of it.
+    befallen: Option<(&'static str, String)>,
+    /// What has been told of what robots carry.
+    carried: Told,
+    /// Laws move parts of things.
+    turning: bool,
     /// Readings each node depends on, found once.
     sampled: BTreeMap<NodeId, Vec<u32>>,
     /// When each reading was last told, s.
@@ -90,15 +95,35 @@ impl<'m> Sim<'m> {
         engine.keep(&prepared.keeps);
         let (running, sampled) = (BTreeMap::new(), BTreeMap::new());
         let (told, given) = (BTreeMap::new(), BTreeMap::new());
-        let (moves, swung) = (Moves::default(), None);
-        let moments = Moments::default();
-        Sim { stage: None, moves, engine, prepared, seed, moments, running, started: 0, swung, sampled, told, given }
+        let (moves, befallen, carried) = (Moves::default(), None, Told::default());
+        let (moments, stage, started) = (Moments::default(), None, 0);
+        let turning = false;
+        Sim {
+            stage,
+            moves,
+            engine,
+            prepared,
+            seed,
+            moments,
+            running,
+            started,
+            befallen,
+            carried,
+            turning,
+            sampled,
+            told,
+            given,
+        }
     }
 
     /// Things have places from now on. Where robots move, their motions take the time they need, and fail where there is
     /// no way.
     pub fn with_stage(self, stage: Stage<'m>, moves: Moves, out: &mut dyn Listener) -> Self {
-        let mut sim = Sim { stage: Some(stage), moves, ..self };
+        let model = self.model();
+        let rates: BTreeSet<u32> = model.derivatives.iter().map(|d| d.state).collect();
+        let by_law = |op: &Op| matches!(op, Op::State(state) if rates.contains(state));
+        let turning = stage.followed().any(|node| model.graph.depends(node, by_law));
+        let mut sim = Sim { stage: Some(stage), moves, turning, ..self };
         sim.follow_joints(0.0, out);
         sim
     }
@@ -106,16 +131,93 @@ impl<'m> Sim<'m> {
     /// Joints stand where the model says; how they get there in so many seconds is told.
     /// What one of them runs into on its way is said.
     fn follow_joints(&mut self, lasts: f64, out: &mut dyn Listener) -> Option<String> {
+        self.joints_follow(out, |stage, moved, now| stage.swings(moved, now, lasts, FRAME))
+    }
+
+    /// The same of what laws have moved since a time, s.
+    fn follow_laws(&mut self, since: f64, out: &mut dyn Listener) -> Option<String> {
+        self.joints_follow(out, |stage, moved, now| stage.glides(moved, since, now))
+    }
+
+    fn joints_follow(
+        &mut self,
+        out: &mut dyn Listener,
+        way: impl Fn(&Stage<'m>, &[(InstanceId, Vec<f64>)], f64) -> Vec<Moment>,
+    ) -> Option<String> {
         let stage = self.stage.as_mut().filter(|stage| !stage.fixtures.is_empty())?;
         let engine = &self.engine;
         let moved = stage.follow_joints(|node| Some(engine.eval(node)));
         if moved.is_empty() {
             return None;
         }
-        out.travels(&stage.swings(&moved, engine.time(), lasts, FRAME));
+        out.travels(&way(stage, &moved, engine.time()));
         let (id, met) = self.moves.robots.then(|| stage.swing_meets(&moved)).flatten()?;
         let name = &stage.scene.get(id).name;
         Some(format!("`{}` of `{name}` runs into {} at {}", met.mine, met.whom(), met.place()))
+    }
+
+    /// Tells how what robots carry may be moved now; what of it runs over where it is is said.
+    fn look_at_carried(&mut self, out: &mut dyn Listener) -> Option<String> {
+        let (time, pouring) = (self.engine.time(), self.pouring());
+        let stage = self.stage.as_mut().filter(|_| self.moves.robots)?;
+        stage.come_to(time);
+        let (loads, told) = (self.prepared.model.loads.as_slice(), &mut self.carried);
+        let mut attendant = Attendant { out, stage, loads, pouring, told, found: None };
+        attendant.look(time, &self.engine);
+        let overflow = attendant.found;
+        overflow.map(|overflow| self.overflow(overflow))
+    }
+
+    /// The vessels that pour, or are being tilted over another one: what their own steps know of that is judged where these begin.
+    fn pouring(&self) -> BTreeSet<InstanceId> {
+        let tilted = |running: &Running| match running.motion {
+            Some(Motion::Tilted { about: (vessel, _), .. }) => Some(vessel),
+            _ => None,
+        };
+        self.running.values().filter_map(tilted).collect()
+    }
+
+    /// A vessel in hand that runs over, in words.
+    fn overflow(&self, (vessel, over): Overflow) -> String {
+        let Some(stage) = &self.stage else { return String::new() };
+        let name = |id: InstanceId| &stage.scene.get(id).name;
+        let by = stage.held_by(vessel).map(name).map_or("no robot", String::as_str);
+        let tilt = stage.tilt_at(vessel, self.engine.time()).to_degrees();
+        let (vessel, over) = (name(vessel), over * 1e6);
+        // Of what fills it steadily the first drops are not worth a number.
+        let by_how_much =
+            if over < 0.1 { String::new() } else { format!(": {over:.1} mL more are in it than it keeps so") };
+        format!("`{by}` holds `{vessel}` tilted by {tilt:.0} deg, and it runs over{by_how_much}")
+    }
+
+    /// Whether a robot carries a vessel that something may run out of.
+    fn carries_vessels(&self) -> bool {
+        let Some(stage) = self.stage.as_ref().filter(|_| self.moves.robots) else { return false };
+        let loads = self.prepared.model.loads.iter().filter(|load| load.loose.is_some());
+        loads.into_iter().any(|load| stage.held_by(load.instance).is_some())
+    }
+
+    /// Lets time pass; while robots carry vessels, with a look at these.
+    fn let_pass(
+        &mut self,
+        until: f64,
+        watches: &[Watch],
+        out: &mut dyn Listener,
+    ) -> Result<(Advance, Option<Overflow>), Fault> {
+        if !self.carries_vessels() {
+            return Ok((self.engine.advance(until, watches, out)?, None));
+        }
+        let (loads, pouring) = (self.prepared.model.loads.as_slice(), self.pouring());
+        let Some(stage) = self.stage.as_ref() else { return Ok((Advance::Reached, None)) };
+        let mut attendant = Attendant { out, stage, loads, pouring, told: &mut self.carried, found: None };
+        loop {
+            let next = until.min(self.engine.time() + APART);
+            let advance = self.engine.advance(next, watches, &mut attendant)?;
+            attendant.look(self.engine.time(), &self.engine);
+            if attendant.found.is_some() || advance != Advance::Reached || self.engine.time() >= until {
+                return Ok((advance, attendant.found));
+            }
+        }
     }
 
     /// The value of a node when an operation has ended.
@@ -140,6 +242,7 @@ impl<'m> Sim<'m> {
             Some(led) => vec![self.after(operation, led)],
             None => motion.values().into_iter().map(|node| self.measure(node, out)).collect(),
         };
+        self.look_at_carried(out);
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
         let held = self.prepared.model.loads.iter().filter(|load| stage.held_by(load.instance).is_some());
@@ -318,13 +421,14 @@ impl<'m> Sim<'m> {
     pub fn begin(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         let ends = self.attempt(operation, self.engine.time(), out)?;
         self.act(&operation.at_start, out)?;
+        let over = if operation.at_start.is_empty() { None } else { self.look_at_carried(out) };
         let lasts = match &ends {
             Ends::At(end) => end - self.engine.time(),
             _ => 0.0,
         };
         let ends = match self.follow_joints(lasts, out) {
             Some(text) => Ends::Failed("collision".to_string(), text),
-            None => ends,
+            None => over.map_or(ends, |text| Ends::Failed("spilled".to_string(), text)),
         };
         let ticket = Ticket(self.started);
         self.started += 1;
@@ -420,11 +524,11 @@ impl Backend for Sim<'_> {
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
         self.try_again(ticket, out)?;
-        // What moves by itself fails the first operation that is asked for.
+        // What comes about by itself fails the first operation that is asked for.
         if let Some(running) = self.running.get_mut(&ticket)
-            && let Some(text) = self.swung.take()
+            && let Some((name, text)) = self.befallen.take()
         {
-            running.ends = Ends::Failed("collision".to_string(), text);
+            running.ends = Ends::Failed(name.to_string(), text);
         }
         if let Some(status) = self.pending(ticket, out)? {
             return Ok(status);
@@ -440,25 +544,65 @@ impl Backend for Sim<'_> {
             if let Some(text) = self.follow_joints(0.0, out) {
                 return Ok(Status::Failed { name: "collision".to_string(), text });
             }
+            if let Some(text) = self.look_at_carried(out) {
+                return Ok(Status::Failed { name: "spilled".to_string(), text });
+            }
         }
         Ok(Status::Done)
     }
 
+    fn has_befallen(&self) -> bool {
+        self.befallen.is_some()
+    }
+
     fn halt(&mut self, ticket: Ticket) {
         let halted = self.running.remove(&ticket);
+        // How far it had been tilted by then is not known, nor what had run out.
+        if let Some(Motion::Tilted { about: (vessel, _), .. }) =
+            halted.as_ref().and_then(|running| running.motion.as_ref())
+        {
+            self.carried.hush(*vessel);
+        }
         if let (Some(stage), Some(halted)) = (self.stage.as_mut(), halted) {
             stage.let_go(halted.motion.as_ref());
         }
     }
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
-        let advance = self.engine.advance(until, watches, out)?;
-        if let Some(text) = self.follow_joints(0.0, out) {
+        loop {
+            let before = self.engine.time();
+            let next = if self.turning { until.min(before + APART) } else { until };
+            let advance = self.go_on(next, watches, out)?;
+            let there = self.engine.time() >= until;
+            match advance {
+                // Whoever waits looks at what has come about, however long that is before the time it waits for.
+                Advance::Reached if !there && self.befallen.is_some() => return Ok(Advance::Watch(Vec::new())),
+                Advance::Reached if !there => {}
+                advance => return Ok(advance),
+            }
+        }
+    }
+}
+
+impl Sim<'_> {
+    /// Lets time pass, and things with it.
+    fn go_on(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
+        let before = self.engine.time();
+        let (advance, overflow) = self.let_pass(until, watches, out)?;
+        let met = if self.turning { self.follow_laws(before, out) } else { self.follow_joints(0.0, out) };
+        if let Some(text) = met {
             if self.running.is_empty() {
                 let fault = Fault::new(codes::COLLISION, self.engine.time(), text);
                 return Err(fault.help("move it out of the way, or end the motion before it gets there"));
             }
-            self.swung.get_or_insert(text);
+            self.befallen.get_or_insert(("collision", text));
+        }
+        if let Some(text) = overflow.map(|overflow| self.overflow(overflow)) {
+            if self.running.is_empty() {
+                let fault = Fault::new(codes::SPILLED, self.engine.time(), text);
+                return Err(fault.help("set it upright, or stop what fills it before it runs over"));
+            }
+            self.befallen.get_or_insert(("spilled", text));
         }
         if let Advance::Watch(indices) = &advance {
             let fired = indices.iter().filter_map(|&i| watches.get(i)).filter(|w| w.value);

@@ -1,10 +1,11 @@
 //! What a run tells the outside while it goes on.
 
 use matterix_ir::plan::{Condition, Operation, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Span, Unit};
 use serde::{Deserialize, Serialize};
 
-use crate::motion::Moment;
+use crate::motion::{Burden, Moment};
 
 use super::failure::{FailureTrace, Measured};
 use crate::process::{Engine, Observer};
@@ -132,6 +133,8 @@ pub trait Listener: Observer {
     fn reading(&mut self, time: f64, reading: usize, value: f64) {}
     /// A robot begins to move: where it is from moment to moment until it stands still again.
     fn travels(&mut self, moments: &[Moment]) {}
+    /// How a thing that a robot carries may be moved from now on.
+    fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {}
     /// Steps that are asked for now: each is done beside the plan, and its failure is told but ends nothing else.
     fn asked(&mut self, time: f64) -> Vec<Asked> {
         Vec::new()

@@ -1,11 +1,12 @@
 //! Two listeners as one.
 
 use matterix_ir::plan::{Condition, Operation, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Unit};
 
 use super::failure::FailureTrace;
 use super::listener::{Alarm, Asked, ExpectationResult, Listener, OperationState, StepState};
-use crate::motion::Moment;
+use crate::motion::{Burden, Moment};
 use crate::process::{Engine, Observer};
 
 /// Tells both, the first one first.
@@ -71,6 +72,7 @@ impl Listener for Tee<'_> {
     both! {
         step(time: f64, step: StepId, state: StepState);
         travels(moments: &[Moment]);
+        burdened(time: f64, item: InstanceId, burden: Burden);
         operation(time: f64, step: StepId, operation: &Operation, state: OperationState);
         expectation(result: &ExpectationResult);
         failure(failure: &FailureTrace);

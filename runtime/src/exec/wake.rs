@@ -196,7 +196,9 @@ impl Executor<'_, '_> {
             Kind::Wait { at } if self.state.now >= *at => self.push_end(id, End::Done),
             Kind::WaitUntil { .. } => self.look_at_wait(id, fired)?,
             Kind::Hold { .. } => self.look_at_hold(id, fired)?,
-            Kind::Operation { until, .. } if !fired.is_empty() || until.is_some_and(|u| self.state.now >= u) => {
+            Kind::Operation { until, .. }
+                if !fired.is_empty() || until.is_some_and(|u| self.state.now >= u) || self.backend.has_befallen() =>
+            {
                 self.poll(id)?;
             }
             Kind::Monitored { .. } if !stopped => self.look_at_monitors(id, fired)?,

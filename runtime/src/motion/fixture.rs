@@ -118,11 +118,12 @@ impl Stage<'_> {
                 let (Some(slot), Some(value)) = (fixture.joints.get_mut(*variable as usize), value(*position)) else {
                     continue;
                 };
-                if value.is_finite() {
+                // Many steps that are not worth telling come to one that is.
+                if value.is_finite() && (value - *slot).abs() > LEAST {
                     *slot = value;
                 }
             }
-            if before.iter().zip(&fixture.joints).any(|(a, b)| (a - b).abs() > LEAST) {
+            if before != fixture.joints {
                 moved.push((*id, before));
             }
         }
@@ -143,8 +144,34 @@ impl Stage<'_> {
                 let eased = share * share * share * (10.0 + share * (6.0 * share - 15.0));
                 if let Some(fixture) = stage.fixtures.get_mut(id) {
                     fixture.joints = before.iter().zip(&after).map(|(a, b)| a + (b - a) * eased).collect();
+                let speed = 30.0 * (share * (1.0 - share)).powi(2);
+                let acceleration = 60.0 * share * (1.0 + share * (2.0 * share - 3.0));
+                // What is there at once has no speed that could be told.
+                let rush = |by: f64| {
+                    if lasts > 0.0 { [by * speed / lasts, by * acceleration / (lasts * lasts)] } else { [0.0; 2] }
+                };
                 }
-                out.extend(stage.moment(*id, begin + lasts * share));
+                let rushing: Vec<(usize, [f64; 2])> =
+                    before.iter().zip(&after).map(|(a, b)| rush(b - a)).enumerate().collect();
+                out.extend(stage.moment(*id, begin + lasts * share).map(|moment| moment.rushing(&rushing)));
+            }
+        }
+        out
+    }
+
+    /// How things that laws moved got from where they were at one time to where they are at another one: evenly, as these times are near.
+    pub fn glides(&self, moved: &[(InstanceId, Vec<f64>)], from: f64, to: f64) -> Vec<Moment> {
+        let mut stage = self.clone();
+        let mut out = Vec::new();
+        for (id, before) in moved {
+            let Some(after) = self.fixtures.get(id).map(|f| f.joints.clone()) else { continue };
+            let speed = |(a, b): (&f64, &f64)| if to > from { [(b - a) / (to - from), 0.0] } else { [0.0; 2] };
+            let rushing: Vec<(usize, [f64; 2])> = before.iter().zip(&after).map(speed).enumerate().collect();
+            for (time, joints) in [(from, before), (to, &after)] {
+                if let Some(fixture) = stage.fixtures.get_mut(id) {
+                    fixture.joints.clone_from(joints);
+                }
+                out.extend(stage.moment(*id, time).map(|moment| moment.rushing(&rushing)));
             }
         }
         out
@@ -152,6 +179,12 @@ impl Stage<'_> {
 
     /// The joint that carries a link: which of those that move by themselves.
     fn carrying(robot: &Robot, link: u32) -> Option<(usize, &matterix_ir::robot::Joint)> {
+    /// The nodes of the model that say how joints of things stand.
+    pub fn followed(&self) -> impl Iterator<Item = NodeId> + '_ {
+        let all = self.fixtures.keys().filter_map(|id| following(self.scene, *id));
+        all.flat_map(|articulation| articulation.follows.iter().map(|follow| follow.position))
+    }
+
         let mut moving = robot.joints.iter().filter(|j| j.kind != JointKind::Fixed && j.mimic.is_none()).enumerate();
         moving.find(|(_, j)| j.child == link)
     }

@@ -31,8 +31,8 @@ const SWEEP: f64 = 0.04;
 #[derive(Clone, Debug)]
 pub struct Flight {
     /// When it began, s since the run began.
-    begin: f64,
-    performed: Performed,
+    pub(super) begin: f64,
+    pub(super) performed: Performed,
     /// The joints that move.
     joints: Vec<usize>,
     /// The robot and what it holds.
@@ -44,7 +44,7 @@ pub struct Flight {
 
 impl Flight {
     /// When it ends, s since the run began.
-    fn end(&self) -> f64 {
+    pub(super) fn end(&self) -> f64 {
         self.begin + self.performed.duration()
     }
 

@@ -3,7 +3,6 @@
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
 
-use super::pace::Burden;
 use super::performed::Performed;
 use super::stage::Stage;
 
@@ -24,8 +23,17 @@ pub struct Moment {
     pub links: Vec<Pose>,
     /// What it holds, in the lab.
     pub held: Option<(InstanceId, Pose)>,
-    /// What is known of that.
-    pub burden: Burden,
+}
+
+impl Moment {
+    /// The same with the speeds and accelerations of some joints, by index.
+    pub(super) fn rushing(mut self, joints: &[(usize, [f64; 2])]) -> Self {
+        for (joint, [speed, acceleration]) in joints {
+            self.speeds.get_mut(*joint).into_iter().for_each(|v| *v = *speed);
+            self.accelerations.get_mut(*joint).into_iter().for_each(|v| *v = *acceleration);
+        }
+        self
+    }
 }
 
 impl Stage<'_> {
@@ -36,21 +44,11 @@ impl Stage<'_> {
             let links = fixture.links().into_iter().map(|l| base.then(l)).collect();
             let (joints, still) = (fixture.joints.clone(), vec![0.0; fixture.joints.len()]);
             let (speeds, accelerations) = (still.clone(), still);
-            return Some(Moment {
-                time,
-                robot,
-                joints,
-                speeds,
-                accelerations,
-                links,
-                held: None,
-                burden: Burden::default(),
-            });
+            return Some(Moment { time, robot, joints, speeds, accelerations, links, held: None });
         }
         let actor = self.actors.get(&robot)?;
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
-        let burden = held.and_then(|(id, _)| self.burdens.get(&id).copied()).unwrap_or_default();
         let still = vec![0.0; actor.joints.len()];
         Some(Moment {
             time,
@@ -60,7 +58,6 @@ impl Stage<'_> {
             accelerations: still,
             links,
             held,
-            burden,
         })
     }
 

@@ -10,10 +10,12 @@ use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
 
+use super::flight::Flight;
 use super::performed::Performed;
 use super::refused::Refused;
 use super::slosh::{Filled, GRAVITY, Wave};
 use super::stage::Stage;
+use super::tilt::tilt_of;
 
 /// How far apart in time a motion is looked at, s.
 const APART: f64 = 0.005;
@@ -53,6 +55,14 @@ impl Burden {
         Burden { loose: value(load.loose), borne }
     }
 
+    /// Whether it differs from another one by no more than a share.
+    pub fn is_near(&self, other: &Burden, share: f64) -> bool {
+        let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => a == b || (a - b).abs() <= share * a.abs().max(b.abs()),
+            (a, b) => a == b,
+        };
+        near(self.loose, other.loose) && near(self.borne, other.borne)
+    }
 }
 
 /// How a thing is moved, evenly in time: the way of a point of it, its axis, and the way of its centre of mass.
@@ -107,6 +117,25 @@ impl Ride {
         Swing { wave, ..most }
     }
 
+    /// How far the level is from straight across at most, up to a time since the beginning, s, and no earlier than a swing before that; rad.
+    fn across(&self, time: f64, mut wave: Wave, frequency: f64) -> f64 {
+        let swing = 2.0 * PI / frequency;
+        let mut most: f64 = 0.0;
+        for (index, axis) in self.axes.iter().enumerate() {
+            let now = self.apart * index as f64;
+            if now > time {
+                break;
+            }
+            let felt = felt(&self.way, index, self.apart);
+            wave.follow([felt[0], felt[1]], frequency, self.apart);
+            if now + swing >= time {
+                let [x, y] = wave.pull;
+                most = most.max(between(*axis, [x, y, GRAVITY + felt[2]]));
+            }
+        }
+        most
+    }
+
     /// The greatest acceleration of the centre of mass with that of gravity, m/s2.
     fn pull(&self, times: f64) -> f64 {
         let dt = self.apart * times;
@@ -124,6 +153,17 @@ impl Ride {
     fn leave_out_pouring(&mut self) {
         let first = self.tilts().next().unwrap_or_default();
         self.over = self.tilts().take_while(|tilt| *tilt > (first - RIGHTED).max(0.5 * first)).count();
+    }
+
+    /// Whether a vessel that runs over where it is, as has been said then, is tilted no further.
+    fn rights(&self, filled: &Filled) -> bool {
+        let first = self.tilts().next().unwrap_or_default();
+        filled.lost(first) > 0.0 && self.own_tilt() < first + 1e-6
+    }
+
+    /// Leaves out of account what runs out before the vessel keeps what is in it, with room for a wave.
+    fn leave_out_running_over(&mut self, filled: &Filled) {
+        self.over = self.tilts().take_while(|tilt| filled.lost(tilt + RIGHTED) > 0.0).count();
     }
 
     /// The greatest tilt of the thing itself, rad.
@@ -173,6 +213,42 @@ impl Stage<'_> {
         self.burdens = burdens.into_iter().collect();
     }
 
+    /// How far a thing that a robot carries is tilted at a time that is not before now, s: rad.
+    pub fn tilt_at(&self, id: InstanceId, time: f64) -> f64 {
+        match self.flight_with(id, time) {
+            Some((flight, robot)) => {
+                let mut stage = self.clone();
+                if let Some(actor) = stage.actors.get_mut(&robot) {
+                    flight.performed.bring(actor, time - flight.begin);
+                }
+                tilt_of(stage.pose(id))
+            }
+            None => tilt_of(self.pose(id)),
+        }
+    }
+
+    /// How much of a volume runs over the rim of a vessel that a robot carries, at a time that is not before now, s: as it is tilted then, and
+    /// where the robot is under way by the wave that this makes. m3
+    pub fn runs_over(&self, vessel: InstanceId, volume: f64, time: f64) -> f64 {
+        let Some(filled) = self.filled(vessel, volume) else { return 0.0 };
+        let Some((flight, _)) = self.flight_with(vessel, time) else { return filled.lost(tilt_of(self.pose(vessel))) };
+        // The motion is as slow as what was in it needs.
+        let known = self.burdens.get(&vessel).and_then(|burden| burden.loose).unwrap_or(0.0);
+        if volume <= known {
+            return 0.0;
+        }
+        let ride = self.ride(&flight.performed, vessel, filled.surface);
+        let wave = self.began.get(&vessel).copied().unwrap_or_default();
+        filled.lost(ride.across(time - flight.begin, wave, filled.frequency))
+    }
+
+    /// How the robot is under way that carries a thing.
+    fn flight_with(&self, id: InstanceId, time: f64) -> Option<(&Flight, InstanceId)> {
+        let robot = self.held_by(id)?;
+        let flight = self.flights.get(&robot).filter(|flight| flight.end() > time)?;
+        Some((flight, robot))
+    }
+
     /// A motion that has been planned and not begun yet, as slow as what the robot holds, and what stands on that, needs; refused where that
     /// does not help. Of what pours, or is set upright again where it has poured, contents may run out.
     pub(super) fn calmed(
@@ -204,6 +280,7 @@ impl Stage<'_> {
                 Motion::Tilted { about: (source, _), .. } if *source == vessel && ride.is_set_upright() => {
                     ride.leave_out_pouring();
                 }
+                _ if ride.rights(&filled) => ride.leave_out_running_over(&filled),
                 _ => filled.keeps_in(vessel, &ride)?,
             }
             cargo.push(Cargo { vessel, filled, wave, ride });
@@ -275,6 +352,7 @@ impl Stage<'_> {
     fn rocked(&mut self, cargo: &[Cargo], pace: Pace, since: f64) {
         let left = cargo.iter().map(|c| (c.vessel, (c.ride.swing(pace, c.wave, c.filled.frequency).wave, since)));
         self.waves.extend(left);
+        self.began.extend(cargo.iter().map(|c| (c.vessel, c.wave)));
     }
 
     /// How a thing in hand is moved on a way that begins as things stand now.

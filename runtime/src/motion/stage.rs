@@ -85,6 +85,8 @@ pub struct Stage<'p> {
     pub(super) burdens: BTreeMap<InstanceId, Burden>,
     /// The waves that motions left in what was carried, each with when that was, s.
     pub(super) waves: BTreeMap<InstanceId, (Wave, f64)>,
+    /// The waves with which the last motions of what is carried began.
+    pub(super) began: BTreeMap<InstanceId, Wave>,
     /// Shared by all copies of a stage.
     pub(super) figures: Figures,
     /// Shared by all copies of a stage.
@@ -148,6 +150,7 @@ impl<'p> Stage<'p> {
             unknown: Unknown::default(),
             burdens: BTreeMap::new(),
             waves: BTreeMap::new(),
+            began: BTreeMap::new(),
             figures: Figures::default(),
             tilts: Tables::default(),
             bodies: Arc::default(),

@@ -2,13 +2,14 @@
 
 use matterix_ir::model::Domain;
 use matterix_ir::plan::StepId;
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Program, Span};
 use serde::Serialize;
 
 use super::series::{ERROR, Series};
 use super::taken::Taken;
 use crate::exec::{Measured, StepState};
-use crate::motion::Moment;
+use crate::motion::{Burden, Moment};
 
 /// How much a line of the log matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -53,6 +54,17 @@ pub struct StepMark {
     pub step: StepId,
     /// Its state from now on.
     pub state: StepState,
+}
+
+/// How a thing that a robot carries may be moved from a time on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BurdenMark {
+    /// s.
+    pub time: f64,
+    /// The thing.
+    pub item: InstanceId,
+    /// How.
+    pub burden: Burden,
 }
 
 /// A line of the log.
@@ -109,6 +121,8 @@ pub struct Recording {
     pub observables: Vec<Vec<Series>>,
     /// Where robots were while they moved, in order of time.
     pub moments: Vec<Moment>,
+    /// How what robots carry may be moved, in order of occurrence.
+    pub burdens: Vec<BurdenMark>,
     /// In order of occurrence.
     pub events: Vec<EventMark>,
     /// In order of occurrence.
@@ -135,6 +149,11 @@ impl Recording {
         let known = self.moments.partition_point(|m| m.time <= first);
         self.moments.extend_from_slice(moments);
         self.moments[known..].sort_by(|a, b| a.time.total_cmp(&b.time));
+    }
+
+    /// How a thing that a robot carries may be moved changes.
+    pub fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {
+        self.burdens.push(BurdenMark { time, item, burden });
     }
 
     /// Without anything yet, of curves to the error that files have: [`ERROR`].

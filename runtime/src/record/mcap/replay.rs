@@ -33,6 +33,8 @@ pub(super) struct Replay<'p> {
     freed: BTreeSet<InstanceId>,
     /// Whether robots move in this run.
     moves: bool,
+    /// How often something has changed hands.
+    pub(super) changes: u64,
     /// What goes along with whom, by the mover; made anew when something changes hands.
     riders: BTreeMap<InstanceId, Vec<InstanceId>>,
 }
@@ -56,6 +58,7 @@ impl<'p> Replay<'p> {
             dropped: BTreeSet::new(),
             freed: BTreeSet::new(),
             moves: !run.recording.moments.is_empty(),
+            changes: 0,
             riders: BTreeMap::new(),
             stage,
         }
@@ -124,7 +127,7 @@ impl<'p> Replay<'p> {
         }
         moved |= self.arrive(time);
         if moved {
-            self.riders.clear();
+            self.changed_hands();
         }
         moved
     }
@@ -199,8 +202,13 @@ impl<'p> Replay<'p> {
         };
         self.stage.carried.set(id, carried);
         if !same {
-            self.riders.clear();
+            self.changed_hands();
         }
+    }
+
+    fn changed_hands(&mut self) {
+        self.changes += 1;
+        self.riders.clear();
     }
 
     /// What goes along with a robot or a thing with joints and is seen, with where it is now; its own links left out.

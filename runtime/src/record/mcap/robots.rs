@@ -23,6 +23,14 @@ use crate::record::run::Run;
 /// Of links that have no colour of their own.
 const GREY: [f64; 4] = [0.75, 0.77, 0.8, 1.0];
 
+/// What a robot holds.
+struct Hand {
+    item: InstanceId,
+    /// That, then all that goes along, by name.
+    along: Vec<String>,
+    changes: u64,
+}
+
 /// The robots of a recording as it is written, from moment to moment.
 pub(super) struct Robots {
     /// Names of the links of each robot, and of its joints.
@@ -31,12 +39,12 @@ pub(super) struct Robots {
     grips: u16,
     loads: u16,
     burdens: u16,
-    /// By thing in hand, what was last known of it.
-    known: BTreeMap<InstanceId, Burden>,
-    /// By robot, what it last held.
-    hands: BTreeMap<InstanceId, InstanceId>,
+    /// By robot, what it last held, with what goes along, and how often things had changed hands by then.
+    hands: BTreeMap<InstanceId, Hand>,
     /// The first moment that has not been written.
     next: usize,
+    /// The first burden that has not been written.
+    told: usize,
 }
 
 impl Robots {
@@ -48,8 +56,8 @@ impl Robots {
         frames: u16,
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
-        let (names, known, hands) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, known, hands, next: 0 };
+        let (names, hands) = (BTreeMap::new(), BTreeMap::new());
+        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, hands, next: 0, told: 0 };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
@@ -89,8 +97,8 @@ impl Robots {
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
             replay.moment(moment);
-            self.grip(&replay.stage, moment, sink)?;
-            self.burden(run, moment, sink)?;
+            self.grip(replay, moment, sink)?;
+            self.burdens(run, moment.time, sink)?;
             self.write(moment, sink, frames)?;
             travelled = true;
             for (robot, items) in replay.loads() {
@@ -106,34 +114,44 @@ impl Robots {
                 sink.push(frames, moment.time, &FrameTransforms { transforms })?;
             }
         }
+        self.burdens(run, time, sink)?;
         Ok(travelled)
     }
 
-    /// Writes what is in a hand where that is something else than before, with all that goes along.
-    fn grip<W: Write + Seek>(&mut self, stage: &Stage<'_>, moment: &Moment, sink: &mut Sink<W>) -> McapResult<()> {
-        let now = moment.held.map(|(id, _)| id);
-        if self.hands.get(&moment.robot).copied() == now {
+    /// Writes what is in a hand, with all that goes along, where that is something else than before.
+    fn grip<W: Write + Seek>(&mut self, replay: &Replay<'_>, moment: &Moment, sink: &mut Sink<W>) -> McapResult<()> {
+        let (stage, now) = (&replay.stage, moment.held.map(|(id, _)| id));
+        let before = self.hands.get(&moment.robot);
+        if before.map(|hand| hand.item) == now && before.is_none_or(|hand| hand.changes == replay.changes) {
             return Ok(());
         }
-        match now {
-            Some(id) => self.hands.insert(moment.robot, id),
-            None => self.hands.remove(&moment.robot),
-        };
         let items = now.map(|id| bodies::along(stage, id)).unwrap_or_default();
+        let same = before.is_some_and(|hand| hand.along == items);
+        match now {
+            Some(item) => {
+                let along = items.iter().map(|name| (*name).to_owned()).collect();
+                self.hands.insert(moment.robot, Hand { item, along, changes: replay.changes });
+            }
+            None => drop(self.hands.remove(&moment.robot)),
+        }
+        if same {
+            return Ok(());
+        }
         let robot = &stage.scene.get(moment.robot).name;
         sink.push(self.grips, moment.time, &bodies::Grip { robot, items })
     }
 
-    /// Writes what is known of what is in a hand, where that is not what it was.
-    fn burden<W: Write + Seek>(&mut self, run: &Run<'_>, moment: &Moment, sink: &mut Sink<W>) -> McapResult<()> {
-        let Some((id, _)) = moment.held.filter(|_| moment.burden != Burden::default()) else { return Ok(()) };
-        if self.known.insert(id, moment.burden) == Some(moment.burden) {
-            return Ok(());
+    /// Writes how what robots carry may be moved, as it changed up to a time, s.
+    fn burdens<W: Write + Seek>(&mut self, run: &Run<'_>, time: f64, sink: &mut Sink<W>) -> McapResult<()> {
+        while let Some(mark) = run.recording.burdens.get(self.told).filter(|mark| mark.time <= time) {
+            self.told += 1;
+            let item = run.program.scene.get(mark.item).name.as_str();
+            let Burden { loose, borne } = mark.burden;
+            let borne = borne.filter(|borne| borne.is_finite());
+            let burden = bodies::Burdened { item, loose: loose.unwrap_or_default(), borne };
+            sink.push(self.burdens, mark.time, &burden)?;
         }
-        let item = run.program.scene.get(id).name.as_str();
-        let Burden { loose, borne } = moment.burden;
-        let borne = borne.filter(|borne| borne.is_finite());
-        sink.push(self.burdens, moment.time, &bodies::Burdened { item, loose: loose.unwrap_or_default(), borne })
+        Ok(())
     }
 
     fn write<W: Write + Seek>(&self, moment: &Moment, sink: &mut Sink<W>, frames: u16) -> McapResult<()> {
