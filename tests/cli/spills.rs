@@ -386,3 +386,24 @@ fn a_recording_that_ends_with_a_pour_is_judged_by_what_has_run_out() {
     let verdict = matterixc_in(&dir, &["verify", "out"]);
     assert!(verdict.code == 0 && verdict.out.contains("nothing wrong"), "{}", verdict.out);
 }
+
+#[test]
+fn joints_that_turn_so_that_what_is_carried_runs_over_are_found() {
+    let turn = "turn joints arm to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 120 deg, 45 deg]";
+    let steps = format!("pick tray by arm\n    {turn}\n    home arm\n    put back tray by arm");
+    let dir = folder("spills_turned");
+    let check = |volume: &str| {
+        write(&dir, "bench.mtx", tray("", volume, 0.5, &steps));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        (check.code, check.out + &check.err)
+    };
+    let (code, said) = check(" holding 68 mL of water");
+    assert!(code == 1 && said.contains("error[spilled]: `cup` runs over in the hand of `arm`"), "{said}");
+    let (code, said) = check(" holding 30 mL of water");
+    assert_eq!(code, 0, "{said}");
+    // What only a run can tell, as how much a pump has brought by then, the run says.
+    let text = pumped("pump 180 mL at 60 mL/min by pump").replace(TIPPED, "wait 1 s");
+    write(&dir, "run.mtx", text.replace("by pump\n", &format!("by pump\n    {TIPPED}\n")));
+    let run = matterixc_in(&dir, &["run", "run.mtx", "--fidelity", "motion"]);
+    assert!(run.code == 1 && run.out.contains("spilled: `panda` tilts `source` so far that"), "{}{}", run.out, run.err);
+}

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::hash::Hasher;
 
-use matterix_ir::model::{Action, Model};
+use matterix_ir::model::{Action, Load, Model};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, Program, Span};
@@ -86,6 +86,21 @@ impl Course<'_> {
         }
         let values = &self.values;
         self.stage.follow_joints(|node| values.value(model, node))
+    }
+
+    /// The first vessel in a hand in which there is more than it keeps as it is tilted, and how much more, m3; of those of which that is known.
+    pub fn runs_over(&self, model: &Model) -> Option<(InstanceId, f64)> {
+        let known = |id: InstanceId| {
+            let robot = self.stage.held_by(id).filter(|robot| !self.stage.unknown.postures.contains(robot));
+            robot.is_some() && !self.stage.unknown.places.contains(&id)
+        };
+        let loads = model.loads.iter().filter(|load| load.loose.is_some() && known(load.instance));
+        let over = |load: &Load| {
+            let volume = self.values.value(model, load.loose?)?;
+            let over = self.stage.runs_over(load.instance, volume, f64::INFINITY);
+            (over > 0.0).then_some((load.instance, over))
+        };
+        loads.into_iter().find_map(over)
     }
 
     /// A thing is carried by something else from now on, nobody says how: where it is then is known only where there is

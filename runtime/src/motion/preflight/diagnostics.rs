@@ -186,6 +186,16 @@ impl fmt::Display for Aim<'_> {
     }
 }
 
+/// The finding for a vessel in hand in which there is more than it keeps as it is held.
+pub fn over(stage: &Stage<'_>, vessel: InstanceId, over: f64, span: Span) -> Diagnostic {
+    let name = |id: InstanceId| stage.scene.get(id).name.as_str();
+    let arm = stage.held_by(vessel).map_or("a robot", name);
+    let headline = format!("`{}` runs over in the hand of `{arm}`", name(vessel));
+    let tilt = stage.tilt_at(vessel, f64::INFINITY).to_degrees();
+    let label = format!("tilted by {tilt:.0} deg, it holds {:.1} mL more than it keeps", over * 1e6);
+    Diagnostic::error(codes::SPILLED, span, headline, label)
+}
+
 /// The finding for a part of a thing that runs into something as it moves by itself.
 pub fn swing(stage: &Stage<'_>, id: InstanceId, meeting: &Meeting, span: Span) -> Diagnostic {
     let thing = stage.scene.get(id);

@@ -213,6 +213,16 @@ fn number(value: Option<f64>) -> Option<f64> {
     value.filter(|v| !v.is_nan())
 }
 
+/// Whether a motion may tilt what a robot holds by more than it is told: on straight ways that stays as it is.
+fn may_tilt(motion: &Motion) -> bool {
+    match motion {
+        Motion::Tilted { .. } | Motion::Joints { .. } | Motion::Home { .. } => true,
+        Motion::To { straight, within, .. } => !straight && within.is_none(),
+        Motion::By { straight, .. } => !straight,
+        _ => false,
+    }
+}
+
 /// Quantities that motions depend on, such as how far a tip hangs below its nozzle, as far as no law and no event changes them.
 /// To follow the others would be to tell courses apart that are the same in space.
 fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
@@ -225,8 +235,8 @@ fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
     };
     let mut assigned: BTreeMap<u32, Vec<NodeId>> = BTreeMap::new();
     let mut open: Vec<NodeId> = Vec::new();
-    // How far a vessel is tilted to pour goes by what is in it.
-    let mut pours = false;
+    // How far a vessel may be tilted goes by what is in it.
+    let mut tilts = false;
     for operation in operations() {
         for action in operation.at_start.iter().chain(&operation.at_end) {
             if let Action::Assign { state, value, .. } = action {
@@ -234,18 +244,18 @@ fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
             }
         }
         if let Some(motion) = &operation.motion {
-            pours |= matches!(motion, Motion::Tilted { .. });
+            tilts |= may_tilt(motion);
             if !matches!(motion, Motion::Upright { .. }) {
                 open.extend(motion.values());
             }
             open.extend(motion.choice());
         }
     }
-    if pours {
+    if tilts {
         open.extend(model.loads.iter().flat_map(|load| [load.loose, load.taxed]).flatten());
     }
     let by_laws = model.derivatives.iter().map(|d| d.state);
-    let mixed = model.mixtures.iter().filter(|_| !pours);
+    let mixed = model.mixtures.iter().filter(|_| !tilts);
     let in_mixtures = mixed.flat_map(|m| m.extensive.iter().map(|(_, state)| *state));
     let moving: BTreeSet<u32> = by_laws.chain(in_mixtures).chain(by_events.iter().copied()).collect();
     let (mut seen, mut found) = (BTreeSet::new(), BTreeSet::new());

@@ -295,6 +295,7 @@ impl<'p> Walk<'p, '_> {
                 self.raise(failure, &course);
             }
         }
+        let over = course.runs_over(&self.program.model).map(|(vessel, _)| vessel);
         // As in a run, what a motion depends on is what was before its operation began.
         if operation.motion.is_some() && course.lost.is_none() {
             let site = self.sites.last().copied().unwrap_or(span);
@@ -311,6 +312,15 @@ impl<'p> Walk<'p, '_> {
         course.act(self.program, &operation.at_start);
         course.act(self.program, &operation.at_end);
         course.stage.let_go(operation.motion.as_ref());
+        if course.lost.is_none()
+            && let Some((vessel, by)) =
+                course.runs_over(&self.program.model).filter(|(vessel, _)| over != Some(*vessel))
+        {
+            let site = self.sites.last().copied().unwrap_or(span);
+            let finding = on_step(diagnostics::over(&course.stage, vessel, by, site), span);
+            course.lost =
+                Some(Box::new(Refusal { failure: "spilled", finding, cause: Cause::default(), missed: None }));
+        }
         let moved = course.follow_joints(&self.program.model);
         // Of what moves at the same time it is not known when.
         let stays = |stage: &Stage<'_>, with: Option<InstanceId>| {
