@@ -1,6 +1,6 @@
 //! Parts of things that move with their states, arms that move them, and robots that drive.
 
-use crate::harness::{folder, matterixc, matterixc_in, write};
+use crate::harness::{folder, matterixc, matterixc_in, root, write};
 
 #[test]
 fn examples_of_handles_and_of_driving_pass_at_both_fidelities() {
@@ -51,8 +51,67 @@ fn a_part_that_a_process_turns_stops_the_run_where_it_runs_into_something() {
     assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
     assert!(ended.err.contains("`plate` of `disc` runs into `post`"), "{}", ended.err);
     write(&dir, "disc.mtx", text.replace("(200, 200) mm", "(200, 400) mm"));
-    let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion"]);
+    let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion", "--out", "out"]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    // It is recorded as it turns, at its speed.
+    let turned = joint(&dir.join("out/recording.mcap"), "disc.plate");
+    let speed = 20_f64.to_radians();
+    let during = turned.iter().filter(|(time, ..)| (0.5..8.0).contains(time)).collect::<Vec<_>>();
+    assert!(during.len() > 50, "{}", during.len());
+    assert!(
+        during.iter().all(|(time, at, v)| (at - speed * time).abs() < 1e-3 && (v - speed).abs() < 1e-3),
+        "{during:?}"
+    );
+    let verdict = matterixc_in(&dir, &["verify", "out"]);
+    assert!(verdict.code == 0, "{}", verdict.out);
+}
+
+/// Time, position and speed of a joint as recorded.
+fn joint(file: &std::path::Path, name: &str) -> Vec<(f64, f64, f64)> {
+    let recording = matterix_recording::read(&std::fs::read(file).expect("a recording")).expect("it can be read");
+    let topic = recording.topics.iter().find(|topic| topic.name == "/joints").expect("joints");
+    let states = topic.messages.iter().flat_map(|(time, message)| {
+        let all = matterix_recording::list(message, "joints").iter();
+        all.filter(|j| matterix_recording::text(j, "name") == name)
+            .map(|j| (*time, matterix_recording::number(j, "position"), matterix_recording::number(j, "velocity")))
+    });
+    states.collect()
+}
+
+#[test]
+fn a_part_that_a_hand_leads_or_a_command_moves_is_recorded_as_fast_as_it_goes() {
+    for (name, part) in [("faucet", "tap."), ("glove_box", "box."), ("fume_hood", "hood.")] {
+        let dir = folder("joints_speeds");
+        let file = root().join(format!("examples/{name}.mtx")).display().to_string();
+        let run = matterixc_in(&dir, &["run", &file, "--fidelity", "motion", "--out", name]);
+        assert_eq!(run.code, 0, "{}{}", run.out, run.err);
+        let recording = dir.join(name).join("recording.mcap");
+        let names = std::fs::read(&recording).expect("a recording");
+        let recorded = matterix_recording::read(&names).expect("it can be read");
+        let topic = recorded.topics.iter().find(|topic| topic.name == "/joints").expect("joints");
+        let own = topic.messages.iter().flat_map(|(_, message)| matterix_recording::list(message, "joints"));
+        let mut parts: Vec<&str> =
+            own.map(|j| matterix_recording::text(j, "name")).filter(|n| n.starts_with(part)).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let mut moved = 0;
+        for part in parts {
+            for pair in joint(&recording, part).windows(2) {
+                let ((t, a, v), (u, b, w)) = (pair[0], pair[1]);
+                // Between two samples of a motion the mean of both speeds leads nearly there.
+                if u - t > 1e-6 && u - t < 0.05 && (b - a).abs() > 1e-3 {
+                    moved += 1;
+                    assert!(
+                        (b - a - 0.5 * (v + w) * (u - t)).abs() < 0.1 * (b - a).abs() + 1e-3,
+                        "{part} at {t}: {pair:?}"
+                    );
+                }
+            }
+        }
+        assert!(moved > 5, "{name}: {moved}");
+        let verdict = matterixc_in(&dir, &["verify", name]);
+        assert!(verdict.code == 0, "{}", verdict.out);
+    }
 }
 
 #[test]

@@ -164,6 +164,49 @@ fn a_thing_that_a_grip_barely_bears_is_carried_more_slowly() {
 }
 
 #[test]
+fn a_beaker_filled_to_the_brim_is_poured_from_as_long_as_it_holds_its_contents() {
+    // The inside holds 322.0 mL: a tilt of 0.3 deg brings 321.5 mL to the lip.
+    let brim = "asset Brim: Beaker250mL { max_volume: 322 mL }";
+    let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
+    for volume in ["321.5 mL", "322 mL"] {
+        let text = bench("", "Beaker250mL", volume, brim, pour).replace("source = Beaker250mL", "source = Brim");
+        judged("spills_brim", &text);
+    }
+}
+
+#[test]
+fn pouring_nothing_or_less_and_pouring_from_an_empty_vessel_are_refused_in_words() {
+    let dir = folder("spills_nothing");
+    let pour = |amount: &str| {
+        format!("let m <- pour {amount} from source into target by panda using scale {{ tolerance: 1 g }}")
+    };
+    let tilt = |amount: &str| {
+        format!(
+            "pick source by panda\n    tip source into target by panda\n    \
+             tilt source into target by panda {{ amount: {amount} }}\n    put back source by panda"
+        )
+    };
+    let cases = [
+        ("100 mL", pour("0 g"), "0 g are to be poured"),
+        ("100 mL", pour("-5 g"), "-5 g are to be poured"),
+        ("100 mL", tilt("0 g"), "0 g are to be poured"),
+        ("0 mL", pour("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
+        ("0 mL", tilt("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
+    ];
+    for (volume, steps, said) in cases {
+        write(&dir, "bench.mtx", bench("", "Beaker250mL", volume, "", &steps).replace(" holding 0 mL of water", ""));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        assert!(check.code == 1 && check.out.contains(said), "{steps}: {}{}", check.out, check.err);
+    }
+    // What is poured may be known in the run only.
+    let steps = "pick source by panda\n    tip source into target by panda\n    let left = scale.net\n    \
+                 tilt source into target by panda { amount: left - left }\n    put back source by panda";
+    write(&dir, "bench.mtx", bench("", "Beaker250mL", "100 mL", "", steps));
+    let run = matterixc_in(&dir, &["run", "bench.mtx"]);
+    assert!(run.code != 0 && (run.out + &run.err).contains("0 g are to be poured"));
+}
+
+#[test]
 fn a_vessel_wider_than_its_lip_is_held_clear_of_the_rim_that_it_leans_over() {
     // Its outside: 17.5 mm at the lip, 132 mm high, and 41 mm from 15 mm down. Of what is within 35 mm behind the lip the lowest is on the wall
     // between (17.5, 103) and (41, 15), or on that below; at 80 deg it is the neck's.
@@ -248,38 +291,6 @@ fn a_handler_for_what_a_motion_fails_with_is_no_dead_one() {
     assert!(run.out.contains("ran over") || run.err.contains("ran over"), "{}{}", run.out, run.err);
 }
 
-#[test]
-fn pouring_nothing_or_less_and_pouring_from_an_empty_vessel_are_refused_in_words() {
-    let dir = folder("spills_nothing");
-    let pour = |amount: &str| {
-        format!("let m <- pour {amount} from source into target by panda using scale {{ tolerance: 1 g }}")
-    };
-    let tilt = |amount: &str| {
-        format!(
-            "pick source by panda\n    tip source into target by panda\n    \
-             tilt source into target by panda {{ amount: {amount} }}\n    put back source by panda"
-        )
-    };
-    let cases = [
-        ("100 mL", pour("0 g"), "0 g are to be poured"),
-        ("100 mL", pour("-5 g"), "-5 g are to be poured"),
-        ("100 mL", tilt("0 g"), "0 g are to be poured"),
-        ("0 mL", pour("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
-        ("0 mL", tilt("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
-    ];
-    for (volume, steps, said) in cases {
-        write(&dir, "bench.mtx", bench("", "Beaker250mL", volume, "", &steps).replace(" holding 0 mL of water", ""));
-        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
-        assert!(check.code == 1 && check.out.contains(said), "{steps}: {}{}", check.out, check.err);
-    }
-    // What is poured may be known in the run only.
-    let steps = "pick source by panda\n    tip source into target by panda\n    let left = scale.net\n    \
-                 tilt source into target by panda { amount: left - left }\n    put back source by panda";
-    write(&dir, "bench.mtx", bench("", "Beaker250mL", "100 mL", "", steps));
-    let run = matterixc_in(&dir, &["run", "bench.mtx"]);
-    assert!(run.code != 0 && (run.out + &run.err).contains("0 g are to be poured"));
-}
-
 /// A lab with a tray of 150 g, a beaker of 50 mL on it, and a mat; the fingers bear the tray by this friction.
 fn tray(arm: &str, volume: &str, friction: f64, steps: &str) -> String {
     format!(
@@ -315,14 +326,24 @@ fn what_stands_on_a_tray_is_carried_as_carefully_as_what_is_in_hand() {
 }
 
 #[test]
-fn a_beaker_filled_to_the_brim_is_poured_from_as_long_as_it_holds_its_contents() {
-    // The inside holds 322.0 mL: a tilt of 0.3 deg brings 321.5 mL to the lip.
-    let brim = "asset Brim: Beaker250mL { max_volume: 322 mL }";
-    let pour = "let m <- pour 20 g from source into target by panda using scale { tolerance: 1 g }";
-    for volume in ["321.5 mL", "322 mL"] {
-        let text = bench("", "Beaker250mL", volume, brim, pour).replace("source = Beaker250mL", "source = Brim");
-        judged("spills_brim", &text);
-    }
+fn joints_that_turn_so_that_what_is_carried_runs_over_are_found() {
+    let turn = "turn joints arm to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 120 deg, 45 deg]";
+    let steps = format!("pick tray by arm\n    {turn}\n    home arm\n    put back tray by arm");
+    let dir = folder("spills_turned");
+    let check = |volume: &str| {
+        write(&dir, "bench.mtx", tray("", volume, 0.5, &steps));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        (check.code, check.out + &check.err)
+    };
+    let (code, said) = check(" holding 68 mL of water");
+    assert!(code == 1 && said.contains("error[spilled]: `cup` runs over in the hand of `arm`"), "{said}");
+    let (code, said) = check(" holding 30 mL of water");
+    assert_eq!(code, 0, "{said}");
+    // What only a run can tell, as how much a pump has brought by then, the run says.
+    let text = pumped("pump 180 mL at 60 mL/min by pump").replace(TIPPED, "wait 1 s");
+    write(&dir, "run.mtx", text.replace("by pump\n", &format!("by pump\n    {TIPPED}\n")));
+    let run = matterixc_in(&dir, &["run", "run.mtx", "--fidelity", "motion"]);
+    assert!(run.code == 1 && run.out.contains("spilled: `panda` tilts `source` so far that"), "{}{}", run.out, run.err);
 }
 
 /// A lab with a pump from a bottle to a beaker of 250 mL that an arm picks up.
@@ -338,10 +359,6 @@ fn pumped(steps: &str) -> String {
          pick source by panda\n    {TIPPED}\n    {steps}\n}}\n"
     )
 }
-
-/// The beaker in hand is tilted by 35 deg: it keeps 241.5 mL.
-const TIPPED: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 125 deg, 45 deg, 0 deg]";
-const UPRIGHT: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 90 deg, 45 deg, 0 deg]";
 
 /// The beaker in hand is tilted by 35 deg: it keeps 241.5 mL.
 const TIPPED: &str = "turn joints panda to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 125 deg, 45 deg, 0 deg]";
@@ -385,25 +402,4 @@ fn a_recording_that_ends_with_a_pour_is_judged_by_what_has_run_out() {
     matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
     let verdict = matterixc_in(&dir, &["verify", "out"]);
     assert!(verdict.code == 0 && verdict.out.contains("nothing wrong"), "{}", verdict.out);
-}
-
-#[test]
-fn joints_that_turn_so_that_what_is_carried_runs_over_are_found() {
-    let turn = "turn joints arm to [0 deg, -45 deg, 0 deg, -135 deg, 0 deg, 120 deg, 45 deg]";
-    let steps = format!("pick tray by arm\n    {turn}\n    home arm\n    put back tray by arm");
-    let dir = folder("spills_turned");
-    let check = |volume: &str| {
-        write(&dir, "bench.mtx", tray("", volume, 0.5, &steps));
-        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
-        (check.code, check.out + &check.err)
-    };
-    let (code, said) = check(" holding 68 mL of water");
-    assert!(code == 1 && said.contains("error[spilled]: `cup` runs over in the hand of `arm`"), "{said}");
-    let (code, said) = check(" holding 30 mL of water");
-    assert_eq!(code, 0, "{said}");
-    // What only a run can tell, as how much a pump has brought by then, the run says.
-    let text = pumped("pump 180 mL at 60 mL/min by pump").replace(TIPPED, "wait 1 s");
-    write(&dir, "run.mtx", text.replace("by pump\n", &format!("by pump\n    {TIPPED}\n")));
-    let run = matterixc_in(&dir, &["run", "run.mtx", "--fidelity", "motion"]);
-    assert!(run.code == 1 && run.out.contains("spilled: `panda` tilts `source` so far that"), "{}{}", run.out, run.err);
 }

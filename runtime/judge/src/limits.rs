@@ -12,6 +12,11 @@ const ROUNDING: f64 = 1e-6;
 /// half the digits.
 const ASTRAY: f64 = 1e-6;
 
+/// Where no acceleration is known, the way between two samples may be off by such a share of it, and so much, rad or m: accelerations change
+/// within it.
+const UNEVEN: f64 = 0.1;
+const LEAST: f64 = 2e-4;
+
 /// Samples nearer in time than this are of one moment, s.
 const MOMENT: f64 = 1e-6;
 
@@ -110,6 +115,9 @@ impl Worst<'_> {
             // Times are recorded in whole nanoseconds.
             let loose = 1.0 + 2e-9 / h;
             looked.speed = looked.speed.max(self.beyond(&joint, "speed", moved / h / loose, limits.velocity, time));
+            if limits.acceleration.is_none() {
+                self.without_limit(&joint, i, (a, b));
+            }
             if let Some(limit) = limits.acceleration {
                 self.beyond(&joint, "acceleration", (b.speed[i] - a.speed[i]) / h / loose, limit, time);
                 let by = (moved - 0.5 * (a.speed[i] + b.speed[i]) * h).abs();
@@ -122,6 +130,20 @@ impl Worst<'_> {
                 let share = self.beyond(&joint, "jerk", jerk, limit, time);
                 looked.jerk = Some(looked.jerk.unwrap_or(0.0).max(share));
             }
+        }
+    }
+}
+
+impl Worst<'_> {
+    /// Of a joint of which no limit of acceleration is known, as of a lid or a lever, the recorded speeds and accelerations must lead from one
+    /// place to the next: evenly changing ones do so exactly.
+    fn without_limit(&mut self, joint: &str, i: usize, (a, b): (&Sample, &Sample)) {
+        let (h, moved) = (b.time - a.time, b.position[i] - a.position[i]);
+        let led = 0.5 * (a.speed[i] + b.speed[i]) * h + (a.acceleration[i] - b.acceleration[i]) * h * h / 12.0;
+        let far = moved.abs().max(h * a.speed[i].abs().max(b.speed[i].abs()));
+        let by = (moved - led).abs();
+        if by > UNEVEN * far + LEAST {
+            self.note(Wrong::Jumps { joint: joint.to_owned(), by, time: a.time });
         }
     }
 }

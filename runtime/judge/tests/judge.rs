@@ -45,6 +45,7 @@ struct Run {
     standing: Vec<Standing>,
     /// More messages: topic, time, s, and what it says.
     more: Vec<(&'static str, f64, Value)>,
+    robot: Robot,
 }
 
 impl Run {
@@ -62,7 +63,7 @@ impl Run {
                 mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: time, publish_time: time };
             writer.write_to_known_channel(&header, message.to_string().as_bytes()).expect("a message");
         };
-        let machine = Machine { name: "slide".into(), robot: slide(), tip: 1, tools: 2 };
+        let machine = Machine { name: "slide".into(), robot: self.robot.clone(), tip: 1, tools: 2 };
         let things = self.things.iter().map(|(thing, _)| thing.clone()).collect();
         let standing = self.standing.clone();
         push("/bodies", 0.0, serde_json::to_value(Bodies { things, machines: vec![machine], standing }).expect("JSON"));
@@ -100,7 +101,7 @@ fn gently(time: f64) -> [f64; 3] {
 }
 
 fn wrong(law: fn(f64) -> [f64; 3], astray: f64, things: Vec<(Thing, [f64; 3])>) -> Vec<Wrong> {
-    judge(&Run { law, astray, things, standing: Vec::new(), more: Vec::new() }.file())
+    judge(&Run { law, astray, things, standing: Vec::new(), more: Vec::new(), robot: slide() }.file())
         .expect("a verdict")
         .wrong
 }
@@ -114,6 +115,7 @@ fn a_gentle_motion_beside_things_is_right() {
         things: vec![(post, [0.25, 0.0615, 0.0])],
         standing: Vec::new(),
         more: Vec::new(),
+        robot: slide(),
     };
     let verdict = judge(&run.file()).expect("a verdict");
     assert_eq!(verdict.wrong, []);
@@ -156,7 +158,7 @@ fn what_stands_in_something_from_the_start_is_found() {
         let cube = |name| thing(name, Shape::Box([0.1; 3]));
         let things = vec![(cube("one"), [2.0, 0.0, 0.0]), (cube("other"), [2.0 + apart, 0.0, 0.05])];
         let run =
-            Run { law: gently, astray: 0.0, things, standing: vec![one, other], more: Vec::new() };
+            Run { law: gently, astray: 0.0, things, standing: vec![one, other], more: Vec::new(), robot: slide() };
         judge(&run.file()).expect("a verdict").wrong
     };
     let (one, other) = (|| standing("one", &["table"], true), || standing("other", &["table"], true));
@@ -195,6 +197,24 @@ fn speeds_that_do_not_lead_to_positions_are_found() {
 }
 
 #[test]
+fn parts_without_limits_of_acceleration_must_go_as_fast_as_they_are_said_to() {
+    fn asleep(time: f64) -> [f64; 3] {
+        [gently(time)[0], 0.0, 0.0]
+    }
+    let free = |law| {
+        let mut robot = slide();
+        let joint = &mut robot.joints[0];
+        joint.limits = joint.limits.map(|limits| JointLimits { acceleration: None, ..limits });
+        let (things, standing, more) = (Vec::new(), Vec::new(), Vec::new());
+        judge(&Run { law, astray: 0.0, things, standing, more, robot }.file()).expect("a verdict").wrong
+    };
+    assert_eq!(free(gently), []);
+    let found = free(asleep);
+    let [Wrong::Jumps { joint, by, .. }] = found.as_slice() else { panic!("{found:?}") };
+    assert!(joint == "slide.x" && (by - 0.0157).abs() < 1e-3, "{found:?}");
+}
+
+#[test]
 fn links_that_are_not_where_joints_put_them_are_found() {
     let found = wrong(gently, 1e-3, Vec::new());
     assert!(matches!(found.as_slice(), [Wrong::Astray { by, .. }] if (by - 1e-3).abs() < 1e-9), "{found:?}");
@@ -213,7 +233,7 @@ fn carried(law: fn(f64) -> [f64; 3], volumes: &[(f64, f64)]) -> Vec<Wrong> {
         ("/burdens", *time, json!({ "item": "cup", "loose": volume * 1e-6, "borne": null }))
     };
     more.extend(volumes.iter().map(told));
-    let found = judge(&Run { law, astray: 0.0, things, standing: Vec::new(), more }.file())
+    let found = judge(&Run { law, astray: 0.0, things, standing: Vec::new(), more, robot: slide() }.file())
         .expect("a verdict")
         .wrong;
     found.into_iter().filter(|wrong| matches!(wrong, Wrong::Spills { .. })).collect()
@@ -245,7 +265,7 @@ fn damaged_files_are_refused() {
         assert!(judge(bytes).is_err());
     }
     let whole =
-        Run { law: gently, astray: 0.0, things: Vec::new(), standing: Vec::new(), more: Vec::new() }
+        Run { law: gently, astray: 0.0, things: Vec::new(), standing: Vec::new(), more: Vec::new(), robot: slide() }
             .file();
     for length in (0..whole.len()).step_by(97) {
         let _ = judge(&whole[..length]);

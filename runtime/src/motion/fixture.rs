@@ -17,6 +17,8 @@ use super::stage::Stage;
 
 /// Least change of a joint that is worth telling, rad or m.
 const LEAST: f64 = 1e-6;
+/// How far apart in time a part in hand is looked at for its speed, s.
+const BESIDE: f64 = 1e-3;
 /// Greatest turn or way of a part between two straight pieces of the hand's way, rad or m.
 const PIECE: f64 = 0.05;
 
@@ -142,14 +144,14 @@ impl Stage<'_> {
                 let share = f64::from(step) / f64::from(steps);
                 // The fifth-order polynomial without speed and acceleration at both ends.
                 let eased = share * share * share * (10.0 + share * (6.0 * share - 15.0));
-                if let Some(fixture) = stage.fixtures.get_mut(id) {
-                    fixture.joints = before.iter().zip(&after).map(|(a, b)| a + (b - a) * eased).collect();
                 let speed = 30.0 * (share * (1.0 - share)).powi(2);
                 let acceleration = 60.0 * share * (1.0 + share * (2.0 * share - 3.0));
                 // What is there at once has no speed that could be told.
                 let rush = |by: f64| {
                     if lasts > 0.0 { [by * speed / lasts, by * acceleration / (lasts * lasts)] } else { [0.0; 2] }
                 };
+                if let Some(fixture) = stage.fixtures.get_mut(id) {
+                    fixture.joints = before.iter().zip(&after).map(|(a, b)| a + (b - a) * eased).collect();
                 }
                 let rushing: Vec<(usize, [f64; 2])> =
                     before.iter().zip(&after).map(|(a, b)| rush(b - a)).enumerate().collect();
@@ -177,14 +179,14 @@ impl Stage<'_> {
         out
     }
 
-    /// The joint that carries a link: which of those that move by themselves.
-    fn carrying(robot: &Robot, link: u32) -> Option<(usize, &matterix_ir::robot::Joint)> {
     /// The nodes of the model that say how joints of things stand.
     pub fn followed(&self) -> impl Iterator<Item = NodeId> + '_ {
         let all = self.fixtures.keys().filter_map(|id| following(self.scene, *id));
         all.flat_map(|articulation| articulation.follows.iter().map(|follow| follow.position))
     }
 
+    /// The joint that carries a link: which of those that move by themselves.
+    fn carrying(robot: &Robot, link: u32) -> Option<(usize, &matterix_ir::robot::Joint)> {
         let mut moving = robot.joints.iter().filter(|j| j.kind != JointKind::Fixed && j.mimic.is_none()).enumerate();
         moving.find(|(_, j)| j.child == link)
     }
@@ -284,6 +286,25 @@ impl Stage<'_> {
         let moved = if led.slides { moved } else { moved + turn * ((before - moved) / turn).round() };
         self.set_joint(led.item, led.variable, led.from + moved);
         led.item
+    }
+
+    /// How fast a part goes that a hand takes along, and how that changes, at a time since the motion began, s: per s and s2. It rests at both
+    /// ends.
+    pub(super) fn dragged_at(&self, led: &Led, performed: &Performed, since: f64) -> [f64; 2] {
+        let (robot, end) = (performed.robot, performed.duration());
+        if since - BESIDE < led.since || since + BESIDE > end {
+            return [0.0; 2];
+        }
+        let mut stage = self.clone();
+        let mut at = |time: f64| {
+            if let Some(actor) = stage.actors.get_mut(&robot) {
+                performed.bring(actor, time);
+            }
+            stage.dragged(led, robot);
+            stage.fixtures.get(&led.item).and_then(|f| f.joints.get(led.variable)).copied().unwrap_or_default()
+        };
+        let [before, now, after] = [since - BESIDE, since, since + BESIDE].map(&mut at);
+        [(after - before) / (2.0 * BESIDE), (after - 2.0 * now + before) / (BESIDE * BESIDE)]
     }
 
     /// As it was when a hand began to take it along.

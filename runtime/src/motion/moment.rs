@@ -65,17 +65,23 @@ impl Stage<'_> {
     pub fn moments(&self, performed: &Performed, begin: f64, apart: f64) -> Vec<Moment> {
         let mut stage = self.clone();
         let robot = performed.robot;
-        performed.led.iter().for_each(|led| stage.undrag(led));
         let steps = (performed.duration() / apart).ceil().max(1.0) as u32;
         let mut out = Vec::new();
+        if let Some(led) = &performed.led {
+            // Until then it rests.
+            stage.undrag(led);
+            out.extend(stage.moment(led.item, begin + led.since));
+        }
         for step in 0..=steps {
             let since = performed.duration() * f64::from(step) / f64::from(steps);
             if let Some(actor) = stage.actors.get_mut(&robot) {
                 performed.bring(actor, since);
             }
             if let Some(led) = performed.led.as_ref().filter(|led| since >= led.since) {
+                let rush = stage.dragged_at(led, performed, since);
                 let item = stage.dragged(led, robot);
-                out.extend(stage.moment(item, begin + since));
+                let moment = stage.moment(item, begin + since);
+                out.extend(moment.map(|moment| moment.rushing(&[(led.variable, rush)])));
             }
             if let Some(mut moment) = stage.moment(robot, begin + since) {
                 performed.rush(&mut moment, since);
