@@ -403,3 +403,19 @@ fn a_recording_that_ends_with_a_pour_is_judged_by_what_has_run_out() {
     let verdict = matterixc_in(&dir, &["verify", "out"]);
     assert!(verdict.code == 0 && verdict.out.contains("nothing wrong"), "{}", verdict.out);
 }
+
+#[test]
+fn what_is_filled_into_a_vessel_in_hand_may_be_too_much_for_the_grip() {
+    // The fingers press with 3.2 N and bear as much; the beaker of 105 g weighs 2 N with 100 mL in it, and 3.8 N with 280 mL.
+    let weak = |volume: &str| {
+        let text = pumped(&format!("pump {volume} at 60 mL/min by pump\n    put back source by panda"));
+        text.replace(TIPPED, "").replace("Robotiq2F85 {}", "Robotiq2F85 { force: 3.2 N }")
+    };
+    let dir = folder("spills_filled_weak");
+    for (volume, code) in [("100 mL", 0), ("180 mL", 1)] {
+        write(&dir, "bench.mtx", weak(volume));
+        let check = matterixc_in(&dir, &["check", "--no-cache", "bench.mtx"]);
+        assert_eq!(check.code, code, "{volume}: {}{}", check.out, check.err);
+        assert_eq!(check.out.contains("error[grip-too-weak]: `pump 180 mL"), code == 1, "{}", check.out);
+    }
+}

@@ -89,7 +89,9 @@ impl Elaborator<'_> {
         let least = self.graph.number(f64::MIN_POSITIVE);
         let whole = self.graph.binary(BinaryOp::Add, begin, end);
         let whole = self.graph.binary(BinaryOp::Max, whole, least);
-        let share = self.graph.binary(BinaryOp::Div, begin, whole);
+        // The whole is no less than its beginning, whatever is known of either before the run.
+        let (share, one) = (self.graph.binary(BinaryOp::Div, begin, whole), self.graph.number(1.0));
+        let share = self.graph.binary(BinaryOp::Min, share, one);
         let step = self.graph.binary(BinaryOp::Sub, to, from);
         let step = self.graph.binary(BinaryOp::Mul, step, share);
         self.graph.binary(BinaryOp::Add, from, step)
