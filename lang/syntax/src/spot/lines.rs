@@ -27,6 +27,28 @@ pub(super) fn because(spot: &Spot) -> Option<Mistake> {
     Some(mistake.help("name the failure before it: `else not_enough because \"...\"`"))
 }
 
+/// `command heat { effect ... }`: what follows a verb stands below it.
+pub(super) fn braced_clauses(spot: &Spot) -> Option<Mistake> {
+    if spot.form() != "command" || spot.token != "{" {
+        return None;
+    }
+    let mistake = Mistake::new("a command has no block", "its clauses stand below it, without braces");
+    Some(mistake.help("write each of `says`, `needs`, `effect` and `takes` on a line of its own below"))
+}
+
+/// `state open: Bool = false` in an asset: what its kind has stands in a capability.
+pub(super) fn of_a_capability(spot: &Spot) -> Option<Mistake> {
+    let word = spot.form();
+    if spot.only != Rule::only_asset_line
+        || !["state", "param", "derived", "reading", "command", "event"].contains(&word)
+    {
+        return None;
+    }
+    let mistake = Mistake::new(format!("`{word}` stands in a capability, not in an asset"), "no line of an asset");
+    let help = "declare it in a capability, `capability Opens: Body { ... }`, and give that to the asset: `asset Valve: Opens { ... }`";
+    Some(mistake.help(help).at(spot.start, spot.start + word.len()))
+}
+
 pub(super) fn reserved(spot: &Spot) -> Option<Mistake> {
     let names = spot
         .expected
@@ -168,6 +190,10 @@ pub(super) fn out_of_place(spot: &Spot) -> Option<Mistake> {
         "on" => (
             "`on` handles a failure of nothing",
             "it stands right after the `}` of a `step`, `sequence`, `parallel`, `try`, `keep` or `within`",
+        ),
+        "takes" | "needs" | "presumes" | "effect" | "says" | "option" | "fails" => (
+            "a clause of a skill stands before its block",
+            "write it on a line between the words of the skill and its `{`; a primitive, `extern skill`, has no block",
         ),
         "finally" => ("`finally` belongs to nothing", "it stands right after the `}` of a block"),
         "timeout" => {

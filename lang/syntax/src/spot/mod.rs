@@ -83,6 +83,8 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     signs::equals,
     signs::assignment,
     lines::because,
+    lines::braced_clauses,
+    lines::of_a_capability,
     values::fractional_power,
     values::decimal_comma,
     values::bare_point,
