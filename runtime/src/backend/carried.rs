@@ -11,9 +11,23 @@ use crate::motion::{Burden, Stage};
 use crate::process::{Engine, Observer};
 
 /// While a vessel is carried, it is looked at so often, s: what fills it may do so evenly, in one long step.
-pub(super) const APART: f64 = 0.1;
+const APART: f64 = 0.1;
 /// The share by which a volume or what a grip bears changes before it is told again.
 const NEAR: f64 = 1e-3;
+
+/// The next time after one at which is looked, s: the same whatever else time stops for.
+pub(super) fn edge_after(time: f64) -> f64 {
+    let mut edge = ((time / APART).floor() + 1.0) * APART;
+    while edge <= time {
+        edge += APART;
+    }
+    edge
+}
+
+/// How what robots carry may be moved.
+pub(super) fn carried<'m>(loads: &'m [Load], stage: &Stage<'_>) -> Vec<&'m Load> {
+    loads.iter().filter(|load| stage.held_by(load.instance).is_some()).collect()
+}
 
 /// What has been told of what robots carry.
 #[derive(Clone, Debug, Default)]
@@ -37,8 +51,8 @@ pub(super) type Overflow = (InstanceId, f64);
 pub(super) struct Attendant<'a, 'm> {
     pub(super) out: &'a mut dyn Listener,
     pub(super) stage: &'a Stage<'m>,
-    /// How things may be moved.
-    pub(super) loads: &'m [Load],
+    /// How what is carried may be moved.
+    pub(super) loads: Vec<&'m Load>,
     /// What pours, or is being set upright where it has poured: that may run out.
     pub(super) pouring: BTreeSet<InstanceId>,
     pub(super) told: &'a mut Told,
@@ -48,7 +62,7 @@ pub(super) struct Attendant<'a, 'm> {
 impl Attendant<'_, '_> {
     /// Tells what has changed, and notes the first that runs over.
     pub(super) fn look(&mut self, time: f64, engine: &Engine<'_>) {
-        for load in self.loads.iter().filter(|load| self.stage.held_by(load.instance).is_some()) {
+        for load in &self.loads {
             let id = load.instance;
             let burden = Burden::of(load, |node: Option<NodeId>| node.map(|node| engine.eval(node)));
             let known = self.told.burdens.get(&id).copied().unwrap_or_default();

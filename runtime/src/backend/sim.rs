@@ -9,7 +9,7 @@ use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Leaves, NodeId, Op};
 
-use super::carried::{APART, Attendant, Overflow, Told};
+use super::carried::{Attendant, Overflow, Told, carried, edge_after};
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
@@ -161,7 +161,8 @@ impl<'m> Sim<'m> {
         let (time, pouring) = (self.engine.time(), self.pouring());
         let stage = self.stage.as_mut().filter(|_| self.moves.robots)?;
         stage.come_to(time);
-        let (loads, told) = (self.prepared.model.loads.as_slice(), &mut self.carried);
+        let loads = carried(&self.prepared.model.loads, stage);
+        let told = &mut self.carried;
         let mut attendant = Attendant { out, stage, loads, pouring, told, found: None };
         attendant.look(time, &self.engine);
         let overflow = attendant.found;
@@ -207,13 +208,16 @@ impl<'m> Sim<'m> {
         if !self.carries_vessels() {
             return Ok((self.engine.advance(until, watches, out)?, None));
         }
-        let (loads, pouring) = (self.prepared.model.loads.as_slice(), self.pouring());
+        let pouring = self.pouring();
         let Some(stage) = self.stage.as_ref() else { return Ok((Advance::Reached, None)) };
+        let loads = carried(&self.prepared.model.loads, stage);
         let mut attendant = Attendant { out, stage, loads, pouring, told: &mut self.carried, found: None };
         loop {
-            let next = until.min(self.engine.time() + APART);
-            let advance = self.engine.advance(next, watches, &mut attendant)?;
-            attendant.look(self.engine.time(), &self.engine);
+            let look = edge_after(self.engine.time());
+            let advance = self.engine.advance(until.min(look), watches, &mut attendant)?;
+            if self.engine.time() >= look {
+                attendant.look(self.engine.time(), &self.engine);
+            }
             if attendant.found.is_some() || advance != Advance::Reached || self.engine.time() >= until {
                 return Ok((advance, attendant.found));
             }
@@ -242,7 +246,9 @@ impl<'m> Sim<'m> {
             Some(led) => vec![self.after(operation, led)],
             None => motion.values().into_iter().map(|node| self.measure(node, out)).collect(),
         };
-        self.look_at_carried(out);
+        if let Some(text) = self.look_at_carried(out) {
+            self.befallen.get_or_insert(("spilled", text));
+        }
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
         let held = self.prepared.model.loads.iter().filter(|load| stage.held_by(load.instance).is_some());
@@ -572,7 +578,7 @@ impl Backend for Sim<'_> {
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         loop {
             let before = self.engine.time();
-            let next = if self.turning { until.min(before + APART) } else { until };
+            let next = if self.turning { until.min(edge_after(before)) } else { until };
             let advance = self.go_on(next, watches, out)?;
             let there = self.engine.time() >= until;
             match advance {
