@@ -16,6 +16,9 @@ const STEPPING: &str = "one step\n";
 const HINT: &str = "q and Enter stops, p pauses, r goes on, s lets one step begin\n";
 const CONFIRM: &str = "type y and Enter to confirm, n to stop: ";
 
+/// Who does not confirm what is asked when the terminal has gone.
+const GONE: &str = "nobody, as the terminal is gone,";
+
 /// So many ends of the input in a row are those of a terminal that is gone.
 const MOST_ENDS: usize = 20;
 
@@ -49,11 +52,17 @@ fn show_again(control: &Control) {
 }
 
 /// Listens from here on; false where standard input is no terminal.
-pub fn listen(control: &'static Control) -> bool {
+/// Where the terminal goes away and nobody else can answer, nothing is confirmed any more.
+pub fn listen(control: &'static Control, others_may_answer: bool) -> bool {
     if !std::io::stdin().is_terminal() {
         return false;
     }
-    std::thread::spawn(move || hear(control));
+    std::thread::spawn(move || {
+        hear(control);
+        if !others_may_answer {
+            control.abandon(GONE);
+        }
+    });
     print(Stream::Err, HINT);
     true
 }

@@ -97,7 +97,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     }
     if mode != Mode::Dry {
         keys::heed_signals(&CONTROL).map_err(|e| format!("cannot listen for signals: {e}"))?;
-        if !keys::listen(&CONTROL) && !args.yes && !args.view {
+        if !keys::listen(&CONTROL, args.yes || args.view) && !args.yes && !args.view {
             CONTROL.answer_all(Answer::of_nobody());
         }
     }

@@ -149,3 +149,44 @@ fn a_process_that_stood_still_does_not_pass() {
     let record = matterixc_in(&dir, &["verify", "record"]);
     assert_eq!(record.code, 0, "{}{}", record.out, record.err);
 }
+
+/// A command whose effect depends on what was before is not said twice, whether it moves matter or not; nor is one that says nothing of
+/// what it does.
+#[test]
+fn what_counts_on_is_not_said_twice() {
+    for (name, effect) in [("adds", "\n        effect place = place + 1"), ("unsaid", "\n        takes 1 s")] {
+        let text = format!(
+            "mtx 1\ncapability Sampler: Body {{\n    state place: Ratio = 1\n    command advance{effect}\n}}\n\
+             asset Carousel: Sampler {{ mass: 1 kg }}\n\
+             driver Line for Carousel over tcp(framing: line, timeout: 30 s) {{\n    advance sends \"NEXT\" expects \"DONE\"\n    \
+             safe sends \"STOP\"\n}}\n\
+             lab bench {{ ambient: 22 degC, vials = Carousel at (0, 0, 0) m }}\nworkflow next in bench {{ advance vials }}\n"
+        );
+        let device = Device::start(b'\n', |_, _| Answer::Nothing);
+        let dir = bench(&format!("counts_{name}"), &text, "vials", &device.address);
+        let mut process = command();
+        process.current_dir(&dir).args([
+            "deploy",
+            "lab.mtx",
+            "--bind",
+            "lab.toml",
+            "--mode",
+            "real",
+            "--journal",
+            "journal",
+        ]);
+        let mut process = process.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+        for _ in 0..2000 {
+            if device.heard().iter().any(|line| line == "NEXT") {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        process.kill().expect("it can be killed");
+        process.wait().expect("it ends");
+        let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--resume"];
+        let ended = matterixc_in(&dir, &args);
+        assert!(ended.code == 1 && ended.err.contains("it is not known whether"), "{name}: {}", ended.err);
+        assert_eq!(device.heard().iter().filter(|line| *line == "NEXT").count(), 1, "{name}");
+    }
+}

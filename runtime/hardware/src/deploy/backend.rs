@@ -27,7 +27,7 @@ impl Backend for Hardware<'_, '_> {
     fn moment_after(&mut self, duration: f64) -> f64 {
         let what = Turn::Waits(self.waits);
         self.waits += 1;
-        let behind = self.late(what).map_or(0.0, |to| to - self.twin.now());
+        let behind = self.late_for(what, duration).map_or(0.0, |to| to - self.twin.now());
         self.twin.moment_after(behind + duration)
     }
 

@@ -95,6 +95,16 @@ impl Control {
         self.said().standing = Some(answer);
     }
 
+    /// From now on nobody can answer: what is asked, and what is open, is not confirmed.
+    pub fn abandon(&self, who: &str) {
+        let mut said = self.said();
+        let answer = Answer { yes: false, who: who.to_owned() };
+        for question in std::mem::take(&mut said.open).into_keys() {
+            said.give(question, answer.clone());
+        }
+        said.standing = Some(answer);
+    }
+
     /// A question is put.
     pub fn ask(&self, question: u64, text: &str) {
         let mut said = self.said();

@@ -3,7 +3,7 @@
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::quantity::show_number;
-use matterix_ir::{Span, codes};
+use matterix_ir::{Op, Span, codes};
 use matterix_runtime::backend::Backend;
 use matterix_runtime::fault::Fault;
 
@@ -141,11 +141,7 @@ impl Hardware<'_, '_> {
         let planned = self.program.plan.get(step);
         let Step::Operation(operation) = &planned.step else { return Ok(()) };
         if self.is_repeatable(operation, step) {
-            let set = |action: &Action| match action {
-                Action::Assign { state, .. } => Some(*state),
-                Action::Move { .. } => None,
-            };
-            self.half_said = operation.at_start.iter().chain(&operation.at_end).filter_map(set).collect();
+            self.half_said = operation.at_start.iter().chain(&operation.at_end).filter_map(assigned).collect();
             return Ok(());
         }
         self.refused.set(true);
@@ -159,10 +155,24 @@ impl Hardware<'_, '_> {
         Err(fault)
     }
 
-    /// Whether saying it twice does what saying it once does: it only sets what does not depend on itself, at once.
+    /// Whether saying it twice does what saying it once does: it only sets what does not depend on itself, at once. What a command
+    /// does that sets nothing is not known.
     pub(super) fn is_repeatable(&self, operation: &Operation, step: StepId) -> bool {
         let lasts = self.devices.iter().filter_map(|d| d.driver?.call(step)).any(|e| e.until.is_some());
-        let moves = |a: &Action| matches!(a, Action::Move { .. });
-        !lasts && operation.until.is_none() && !operation.at_start.iter().chain(&operation.at_end).any(moves)
+        let all = || operation.at_start.iter().chain(&operation.at_end);
+        let set: Vec<u32> = all().filter_map(assigned).collect();
+        let graph = &self.program.model.graph;
+        let is_set = |op: Op| matches!(op, Op::State(state) if set.contains(&state));
+        let rests = |action: &Action| graph.schedule([action.source()]).into_iter().any(|node| is_set(graph.op(node)));
+        let only_sets = !set.is_empty() && all().all(|action| assigned(action).is_some() && !rests(action));
+        !lasts && operation.until.is_none() && only_sets
+    }
+}
+
+/// The state that an action sets.
+fn assigned(action: &Action) -> Option<u32> {
+    match action {
+        Action::Assign { state, .. } => Some(*state),
+        Action::Move { .. } => None,
     }
 }
