@@ -72,12 +72,13 @@ fn seen(hand: &Pose, a: &Pose, b: &Pose) -> [f64; 3] {
     [0, 1, 2].map(|k| b[k] - a[k])
 }
 
-/// How far the vial was off as the hand saw it before the fingers closed, and after, m; or what ended that.
-fn picked(program: &Program, by: f64, seed: u64) -> ([f64; 3], Result<[f64; 3], Stray>) {
+/// How far the only thing was off that is picked, as the hand saw it before the fingers closed, and how far and how much turned, m
+/// and rad, after; or what ended that.
+fn picked(program: &Program, name: &str, by: f64, seed: u64) -> ([f64; 3], Result<([f64; 3], f64), Stray>) {
     let mut stage = Stage::new(program).expect("a stage");
     let by = Perturbation { shift: by, turn: 0.02 };
     let mut unseen = Unseen::drawn(program, by, seed).expect("it has room");
-    let [panda, vial] = ["panda", "vial"].map(|name| program.scene.find(name).expect("it is there"));
+    let [panda, thing] = ["panda", name].map(|name| program.scene.find(name).expect("it is there"));
     let all = motions(program);
     let grip = all.iter().position(|(motion, _)| matches!(motion, Motion::Grip { .. })).expect("a grip");
     let mut there = Vec::new();
@@ -87,14 +88,17 @@ fn picked(program: &Program, by: f64, seed: u64) -> ([f64; 3], Result<[f64; 3], 
         there.push((before, stage.clone(), motion.clone(), performed));
     }
     let (at_grip, ..) = &there[grip];
-    let real = unseen.in_stage(at_grip).pose(vial);
-    let off = seen(&stage.tip(panda), &at_grip.pose(vial), &real);
+    let real = unseen.in_stage(at_grip).pose(thing);
+    let off = seen(&stage.tip(panda), &at_grip.pose(thing), &real);
     for (before, after, motion, performed) in &there {
         if let Err(stray) = unseen.follow([before, after], motion, performed.as_ref()) {
             return (off, Err(stray));
         }
     }
-    (off, Ok(seen(&stage.tip(panda), &stage.pose(vial), &unseen.in_stage(&stage).pose(vial))))
+    let (believed, real) = (stage.pose(thing), unseen.in_stage(&stage).pose(thing));
+    let ahead = believed.inverse().then(real);
+    let (from, to) = (ahead.position, ahead.point([1.0, 0.0, 0.0]));
+    (off, Ok((seen(&stage.tip(panda), &believed, &real), (to[1] - from[1]).atan2(to[0] - from[0]))))
 }
 
 #[test]
@@ -102,7 +106,7 @@ fn fingers_centre_what_they_close_on_and_hit_what_is_further_off_than_they_are_o
     let program = program(bench("20 mm", "pick vial by panda"));
     let (mut within, mut beyond) = (0, 0);
     for seed in 0..40 {
-        let (off, after) = picked(&program, 0.015, seed);
+        let (off, after) = picked(&program, "vial", 0.015, seed);
         // The fingers are some 20 mm wide.
         if off[0].abs() > 8e-3 {
             continue;
@@ -113,13 +117,28 @@ fn fingers_centre_what_they_close_on_and_hit_what_is_further_off_than_they_are_o
             assert_eq!(stray.failure, "missed", "{seed}: {stray:?}");
             beyond += 1;
         } else {
-            let after = after.unwrap_or_else(|stray| panic!("{seed}, {off:?}: {stray:?}"));
+            let (after, turned) = after.unwrap_or_else(|stray| panic!("{seed}, {off:?}: {stray:?}"));
             assert!(after[1].abs() < 1e-9, "{seed}: {after:?}");
             assert!((after[0] - off[0]).abs() < 1e-9 && (after[2] - off[2]).abs() < 1e-9, "{seed}: {off:?} {after:?}");
+            assert!(turned != 0.0, "what is round stays turned");
             within += 1;
         }
     }
     assert!(within > 5 && beyond > 3, "{within} {beyond}");
+}
+
+#[test]
+fn flat_sides_turn_to_lie_against_the_fingers() {
+    let text = bench("20 mm", "pick rack by panda")
+        .replace("use std::vials::Vial8mL", "use std::vials::{Vial8mL, VialRack15}");
+    let text = text.replace("block = Block on", "rack = VialRack15 on");
+    let program = program(text);
+    for seed in 0..4 {
+        let (off, after) = picked(&program, "rack", 0.002, seed);
+        let (after, turned) = after.unwrap_or_else(|stray| panic!("{seed}, {off:?}: {stray:?}"));
+        assert!(after[1].abs() < 1e-9 && turned.abs() < 1e-9, "{seed}: {after:?} {turned}");
+        assert!(off[1].abs() > 1e-6 && (after[0] - off[0]).abs() < 1e-4, "{seed}: {off:?} {after:?}");
+    }
 }
 
 #[test]
