@@ -72,9 +72,12 @@ fn seen(hand: &Pose, a: &Pose, b: &Pose) -> [f64; 3] {
     [0, 1, 2].map(|k| b[k] - a[k])
 }
 
+/// How far a thing in hand is off as the hand sees it, m, and how much it is turned, rad.
+type Held = ([f64; 3], f64);
+
 /// How far the only thing was off that is picked, as the hand saw it before the fingers closed, and how far and how much turned, m
 /// and rad, after; or what ended that.
-fn picked(program: &Program, name: &str, by: f64, seed: u64) -> ([f64; 3], Result<([f64; 3], f64), Stray>) {
+fn picked(program: &Program, name: &str, by: f64, seed: u64) -> ([f64; 3], Result<Held, Stray>) {
     let mut stage = Stage::new(program).expect("a stage");
     let by = Perturbation { shift: by, turn: 0.02 };
     let mut unseen = Unseen::drawn(program, by, seed).expect("it has room");
