@@ -184,6 +184,9 @@ pub struct RunArgs {
     /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
     #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
     pub perturb: Option<Perturbation>,
+    /// Let the same things really be so far from where robots take them to be: `--unseen 2mm,1deg`, with `--fidelity motion`.
+    #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
+    pub unseen: Option<Perturbation>,
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,

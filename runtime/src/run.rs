@@ -8,7 +8,7 @@ use crate::backend::{Backend, Dry, Moves, Prepared, Sim};
 use crate::exec::Tee;
 use crate::exec::{self, Around, Execution, FailureTrace, Limits, Listener, RunStatus, StepRecord};
 use crate::fault::Fault;
-use crate::motion::Stage;
+use crate::motion::{Stage, Unseen};
 use crate::process::{BalanceReport, Engine, Options};
 pub use crate::screen::{Finding, Screen};
 
@@ -49,6 +49,8 @@ pub struct RunOptions<'c> {
     pub limits: Limits<'c>,
     /// Accuracy of the process engine.
     pub process: Options,
+    /// How far things are from where robots take them to be, at fidelity `motion`.
+    pub unseen: Unseen,
 }
 
 /// What came of a run: of its plan, and of the lab.
@@ -199,7 +201,7 @@ fn twin<'p>(
     let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
     let mut engine = started.map_err(|fault| Box::new(refused(program, fault)))?;
     engine.heed(options.limits.cancel);
-    let sim = Sim::new(engine, prepared, options.seed);
+    let sim = Sim::new(engine, prepared, options.seed).with_unseen(&options.unseen);
     let moves = options.fidelity == Fidelity::Motion;
     match Stage::new(program) {
         Ok(stage) if moves || !stage.fixtures.is_empty() => {

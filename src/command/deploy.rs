@@ -73,8 +73,15 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if args.mode == DeployMode::SimFirst && !args.resume {
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
         let (fidelity, dry) = (Fidelity::Process, false);
-        let choices =
-            Choices { seed: args.seed, fidelity, dry, turns: Vec::new(), moved: Vec::new(), keep: Keep::Ends };
+        let choices = Choices {
+            seed: args.seed,
+            fidelity,
+            dry,
+            turns: Vec::new(),
+            moved: Vec::new(),
+            unseen: matterix_runtime::motion::Unseen::default(),
+            keep: Keep::Ends,
+        };
         let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
         let (passed, end) = (ran.passed, ran.end_time());
         findings.show(&sources, ran.diagnostics.clone());

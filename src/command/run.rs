@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use matterix_ir::{Diagnostic, Program};
 use matterix_runtime::exec::Turn;
-use matterix_runtime::motion::perturb;
+use matterix_runtime::motion::{Unseen, perturb};
 use matterix_runtime::record::Folder;
 
 use crate::args::{Color, Fidelity, RunArgs, RunFormat};
@@ -23,6 +23,9 @@ pub fn run(args: &RunArgs, color: Color) -> Exit {
 
 /// The run; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
+    if args.unseen.is_some() && (args.fidelity != Fidelity::Motion || args.dry) {
+        return Err("`--unseen` is of robots that move: it needs `--fidelity motion`".to_string());
+    }
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     if let Some(dir) = &args.out {
         is_writable(dir)?;
@@ -38,6 +41,10 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     let moved = match args.perturb {
         Some(by) => perturb(&mut program, by, args.seed)?,
         None => Vec::new(),
+    };
+    let unseen = match args.unseen {
+        Some(by) => Unseen::drawn(&program, by, args.seed)?,
+        None => Unseen::default(),
     };
 
     let found = match args.fidelity == Fidelity::Motion && !args.dry {
@@ -61,7 +68,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     };
     let mut progress = Progress::new(&program.plan, kind(args.format));
     let keep = if args.out.is_some() { Keep::Curves } else { Keep::Ends };
-    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns, moved, keep };
+    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns, moved, unseen, keep };
     let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
     progress.finish();
 

@@ -104,6 +104,7 @@ impl Trial {
             dry: false,
             turns: Vec::new(),
             moved: Vec::new(),
+            unseen: matterix_runtime::motion::Unseen::default(),
             keep: Keep::Ends,
         };
         let ran = pipeline::run(program, sources, &choices, self.cancel, &mut progress);

@@ -1,5 +1,6 @@
 //! A program on the digital twin: executed, followed, recorded and reported.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -9,7 +10,7 @@ use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
-use matterix_runtime::motion::{Burden, Moment, Moved};
+use matterix_runtime::motion::{Burden, Moment, Moved, Unseen};
 use matterix_runtime::process::{Engine, Observer, Options};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo, Sampler};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
@@ -50,6 +51,8 @@ pub struct Choices {
     pub turns: Vec<Turn>,
     /// What stands away from the place it was given.
     pub moved: Vec<Moved>,
+    /// What stands away from where robots take it to be.
+    pub unseen: Unseen,
     /// What is kept of curves: files can be written of [`Keep::Curves`] only.
     pub keep: Keep,
 }
@@ -75,14 +78,17 @@ pub fn run<'a>(
     let fidelity = choices.fidelity();
     let limits = Limits { cancel: Some(cancel), turns: &choices.turns, ..Limits::default() };
     let process = Options { curves: choices.keep == Keep::Curves, ..Options::default() };
-    let options = RunOptions { seed: choices.seed, fidelity, limits, process, ..RunOptions::default() };
+    let unseen = choices.unseen.clone();
+    let options = RunOptions { seed: choices.seed, fidelity, limits, process, unseen, ..RunOptions::default() };
     let recording = Recording::within(program, choices.keep.error());
     let mut follower = Follower { recording, sampler: Sampler::new(&program.model), progress };
-    for moved in &choices.moved {
+    let moved = choices.moved.iter().map(|moved| (moved, "stands", "its place"));
+    let unseen = choices.unseen.moved().iter().map(|moved| (moved, "really stands", "where it is taken to be"));
+    for (moved, stands, from) in moved.chain(unseen) {
         let instance = program.scene.get(moved.thing);
         let [x, y] = moved.shift.map(|m| m * 1e3);
         let text = format!(
-            "`{}` stands ({x:.1}, {y:.1}) mm from its place, turned by {:.1} deg",
+            "`{}` {stands} ({x:.1}, {y:.1}) mm from {from}, turned by {:.1} deg",
             instance.name,
             moved.turn.to_degrees()
         );
@@ -92,14 +98,19 @@ pub fn run<'a>(
     let mut recording = follower.recording;
     recording.reach(outcome.end_time);
     let info = info(&outcome, choices);
-    let report = Report::new(&Run { program, recording: &recording, sources, info: &info });
+    let program = match choices.unseen.is_nothing() {
+        true => Cow::Borrowed(program),
+        false => Cow::Owned(choices.unseen.in_program(program)),
+    };
+    let report = Report::new(&Run { program: &program, recording: &recording, sources, info: &info });
     let passed = outcome.status == RunStatus::Passed;
     Ran { program, sources, recording, info, report, diagnostics: findings(&outcome, sources), passed }
 }
 
 /// A finished run.
 pub struct Ran<'a> {
-    program: &'a Program,
+    /// With things where they really are.
+    program: Cow<'a, Program>,
     sources: &'a Sources,
     recording: Recording,
     info: RunInfo,
@@ -128,7 +139,7 @@ impl Ran<'_> {
 
     /// Writes recording, tables, plots and report into a folder; tables in CSV too where they are wanted.
     pub fn write(&self, dir: &Path, csv: bool) -> Result<(), String> {
-        let run = Run { program: self.program, recording: &self.recording, sources: self.sources, info: &self.info };
+        let run = Run { program: &self.program, recording: &self.recording, sources: self.sources, info: &self.info };
         record::write_all(dir, &run, &self.report, Outputs { csv, ..Outputs::ALL })
             .map(|_| ())
             .map_err(|e| e.to_string())

@@ -64,5 +64,6 @@ mod time;
 mod together;
 mod twin;
 mod types;
+mod unseen;
 mod usage;
 mod verify;

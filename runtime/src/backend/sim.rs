@@ -13,7 +13,7 @@ use super::carried::{Attendant, Overflow, Told, carried, edge_after};
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
-use crate::motion::{Burden, Moment, Refused, Stage, supported, tempi};
+use crate::motion::{Burden, Moment, Refused, Stage, Stray, Unseen, supported, tempi};
 use crate::process::{Advance, Engine, Watch};
 
 /// What moves through space.
@@ -38,6 +38,10 @@ pub struct Sim<'m> {
     started: u64,
     /// What came about by itself, a failure's name and what it says, until an operation has failed of it.
     befallen: Option<(&'static str, String)>,
+    /// How far things are from where the stage has them; none where nothing is.
+    unseen: Option<Unseen>,
+    /// What ends the motion that has just been planned, with what is really there.
+    stray: Option<Stray>,
     /// What has been told of what robots carry.
     carried: Told,
     /// Laws move parts of things.
@@ -73,6 +77,8 @@ enum Ends {
     When(NodeId),
     /// It cannot be done: a failure's name and what it says.
     Failed(String, String),
+    /// It ends at a time, s, by what is really there.
+    Strays(f64, &'static str, String),
     /// Another robot is in its way: tried again when something has moved, until its time is up, s.
     Blocked {
         operation: Box<Operation>,
@@ -98,6 +104,7 @@ impl<'m> Sim<'m> {
         let (moves, befallen, carried) = (Moves::default(), None, Told::default());
         let (moments, stage, started) = (Moments::default(), None, 0);
         let turning = false;
+        let (unseen, stray) = (None, None);
         Sim {
             stage,
             moves,
@@ -108,6 +115,8 @@ impl<'m> Sim<'m> {
             running,
             started,
             befallen,
+            unseen,
+            stray,
             carried,
             turning,
             sampled,
@@ -126,6 +135,11 @@ impl<'m> Sim<'m> {
         let mut sim = Sim { stage: Some(stage), moves, turning, ..self };
         sim.follow_joints(0.0, out);
         sim
+    }
+
+    /// Things are really so far from where they are taken to be.
+    pub fn with_unseen(self, unseen: &Unseen) -> Self {
+        Sim { unseen: Some(unseen.clone()).filter(|unseen| !unseen.is_nothing()), ..self }
     }
 
     /// Joints stand where the model says; how they get there in so many seconds is told.
@@ -151,7 +165,9 @@ impl<'m> Sim<'m> {
             return None;
         }
         out.travels(&way(stage, &moved, engine.time()));
-        let (id, met) = self.moves.robots.then(|| stage.swing_meets(&moved)).flatten()?;
+        let real = self.unseen.as_ref().map(|unseen| unseen.in_stage(stage));
+        let there = real.as_ref().unwrap_or(stage);
+        let (id, met) = self.moves.robots.then(|| there.swing_meets(&moved)).flatten()?;
         let name = &stage.scene.get(id).name;
         Some(format!("`{}` of `{name}` runs into {} at {}", met.mine, met.whom(), met.place()))
     }
@@ -258,15 +274,30 @@ impl<'m> Sim<'m> {
         stage.burden(burdens);
         stage.keep_time(tempi(&self.prepared.model.paces, |node| Some(self.engine.eval(node))));
         let now = self.engine.time();
-        let Some(performed) = stage.set_out(&motion, &values)? else {
+        let before = self.unseen.as_ref().map(|_| stage.clone());
+        let performed = stage.set_out(&motion, &values)?;
+        if let (Some(unseen), Some(before)) = (&mut self.unseen, &before)
+            && let Err(stray) = unseen.follow([before, stage], &motion, performed.as_ref())
+        {
+            stage.clone_from(before);
+            if let Some(performed) = performed.as_ref().filter(|_| stray.at > 0.0) {
+                let real = unseen.in_stage(stage);
+                out.travels(&stage.moments_until(&real, performed, [now, stray.at], FRAME));
+            }
+            self.stray = Some(Stray { at: now + stray.at, ..stray });
+            return Ok(None);
+        }
+        let real = self.unseen.as_ref().map(|unseen| unseen.in_stage(stage));
+        let there = real.as_ref().unwrap_or(stage);
+        let Some(performed) = performed else {
             // What changes hands does so while both stand still.
             if let Motion::Free { on: Some(on), by, .. } = &motion {
-                let robots = [*by, *on].into_iter().filter_map(|id| stage.hand_of(id));
-                out.travels(&robots.filter_map(|robot| stage.moment(robot, now)).collect::<Vec<_>>());
+                let robots = [*by, *on].into_iter().filter_map(|id| there.hand_of(id));
+                out.travels(&robots.filter_map(|robot| there.moment(robot, now)).collect::<Vec<_>>());
             }
             return Ok(None);
         };
-        out.travels(&stage.moments(&performed, now, FRAME));
+        out.travels(&there.moments(&performed, now, FRAME));
         Ok(Some(performed.duration()))
     }
 
@@ -275,7 +306,10 @@ impl<'m> Sim<'m> {
     fn attempt(&mut self, operation: &Operation, begun: f64, out: &mut dyn Listener) -> Result<Ends, Fault> {
         let refused = match self.perform(operation, out) {
             Ok(Some(duration)) => return Ok(Ends::At(self.moment_after(self.rest(operation) + duration))),
-            Ok(None) => return self.end_of(operation, out),
+            Ok(None) => match self.stray.take() {
+                Some(stray) => return Ok(Ends::Strays(stray.at, stray.failure, stray.text)),
+                None => return self.end_of(operation, out),
+            },
             Err(refused) => refused,
         };
         let (now, stage) = (self.engine.time(), self.stage.as_ref());
@@ -309,7 +343,11 @@ impl<'m> Sim<'m> {
             stage.follow_load(*state, value);
             let Some(state) = self.prepared.model.states.get(*state as usize) else { continue };
             if let Some(id) = supported(stage.scene, &state.name, &state.domain) {
+                let before = stage.below(id);
                 stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
+                if let Some(unseen) = self.unseen.as_mut().filter(|_| stage.below(id) != before) {
+                    unseen.forget(id);
+                }
             }
         }
     }
@@ -430,7 +468,7 @@ impl<'m> Sim<'m> {
         self.act(&operation.at_start, out)?;
         let over = if operation.at_start.is_empty() { None } else { self.look_at_carried(out) };
         let lasts = match &ends {
-            Ends::At(end) => end - self.engine.time(),
+            Ends::At(end) | Ends::Strays(end, ..) => end - self.engine.time(),
             _ => 0.0,
         };
         let ends = match self.follow_joints(lasts, out) {
@@ -454,8 +492,8 @@ impl<'m> Sim<'m> {
         let until = |time| Ok(Some(Status::Running { until: Some(time), watch: None }));
         let (condition, periods) = match self.running.get(&ticket).map(|running| &running.ends) {
             None | Some(Ends::Failed(..)) => return Ok(None),
-            Some(Ends::At(at)) if now >= *at => return Ok(None),
-            Some(Ends::At(at)) => return until(*at),
+            Some(Ends::At(at) | Ends::Strays(at, ..)) if now >= *at => return Ok(None),
+            Some(Ends::At(at) | Ends::Strays(at, ..)) => return until(*at),
             Some(Ends::Blocked { until: at, .. }) => return until((now + PATIENCE).min(*at)),
             Some(Ends::When(node)) => {
                 self.engine.defined(*node)?;
@@ -546,6 +584,9 @@ impl Backend for Sim<'_> {
             }
             if let Ends::Failed(name, text) = running.ends {
                 return Ok(Status::Failed { name, text });
+            }
+            if let Ends::Strays(_, name, text) = running.ends {
+                return Ok(Status::Failed { name: name.to_string(), text });
             }
             self.act(&running.at_end, out)?;
             if let Some(text) = self.follow_joints(0.0, out) {

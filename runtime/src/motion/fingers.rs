@@ -90,14 +90,20 @@ impl Fingers {
 
     /// How far the fingers are apart, m; nothing where one of them is not beside the tip.
     pub fn gap(&self, tree: &Tree, all: &[f64]) -> Option<f64> {
+        self.ways(tree, all, [0.0; 3]).map(|[one, other]| one + other)
+    }
+
+    /// How far it is from a point seen from the tip to the fingers on either side, along the tip's y axis and against it, m.
+    pub(super) fn ways(&self, tree: &Tree, all: &[f64], point: [f64; 3]) -> Option<[f64; 2]> {
         let links = tree.poses(all);
         let tip = placement(links.get(self.tip as usize)?);
+        let from = Pose { position: tip.point(point), ..tip };
         let bodies = self.pads.iter().filter_map(|(link, at, shape)| {
             let at = placement(links.get(*link as usize)?).then(*at);
             Some(Body { name: String::new(), pose: pose(&at), shape: shape.clone() })
         });
         let world = World { bodies: bodies.collect(), ..World::default() };
-        Some(free(&world, tip, 1.0)? + free(&world, tip, -1.0)?)
+        Some([free(&world, from, 1.0)?, free(&world, from, -1.0)?])
     }
 
     /// Where the joints stand when the fingers are so far apart, m: as near as they get.

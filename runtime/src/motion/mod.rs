@@ -38,6 +38,7 @@ mod tempo;
 mod tilt;
 mod together;
 mod turn;
+mod unseen;
 mod way;
 
 pub use assembly::Assembly;
@@ -53,3 +54,4 @@ pub use refused::{Meeting, Refused};
 pub use stage::{Actor, Stage};
 pub use tempo::{Tempo, tempi};
 pub use together::together;
+pub use unseen::{Stray, Unseen};

@@ -86,8 +86,15 @@ impl Task for Run {
                 return unrun(&sources, found);
             }
         }
-        let choices =
-            Choices { seed: self.seed, fidelity, dry: false, turns: Vec::new(), moved: Vec::new(), keep: Keep::Ends };
+        let choices = Choices {
+            seed: self.seed,
+            fidelity,
+            dry: false,
+            turns: Vec::new(),
+            moved: Vec::new(),
+            unseen: matterix_runtime::motion::Unseen::default(),
+            keep: Keep::Ends,
+        };
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
         let ran = pipeline::run(&program, &sources, &choices, stop, &mut progress);
         found.extend(ran.diagnostics.iter().cloned());

@@ -1,0 +1,254 @@
+//! `run --unseen`: things that really stand a little away from where robots take them to be.
+
+use std::path::{Path, PathBuf};
+
+use matterix_ir::plan::{Motion, Step};
+use matterix_ir::pose::Pose;
+use matterix_ir::{Op, Program, Sources};
+use matterix_lang::{LibraryOnly, Options, compile};
+use matterix_runtime::motion::{Perturbation, Stage, Stray, Unseen};
+
+use crate::harness::{Ended, folder, matterixc, matterixc_in, write};
+
+/// A vial of 17 mm on a table, and a block with a hole of this width.
+fn bench(bore: &str, lines: &str) -> String {
+    format!(
+        "mtx 1\n\nuse std::robots::{{FrankaHand, FrankaPanda}}\nuse std::vials::Vial8mL\n\n\
+         asset Place: Hole {{\n    mass: 1 g\n    room: cylinder(bore, depth)\n    frame place at (0, 0, 0) mm\n}}\n\n\
+         asset Block: Labware {{\n    mass: 1 kg\n    shape: box(100 mm, 100 mm, 38 mm)\n    \
+         places[A1 .. A2] = Place {{ bore: {bore}, depth: 33 mm }} at (0, 0, 5) mm pitch (30, 30) mm\n}}\n\n\
+         lab bench {{\n    ambient: 22 degC\n    table = OpticalTable\n    \
+         panda = FrankaPanda {{ gripper: FrankaHand {{}} }} on table at (0, 0) mm\n    \
+         vial = Vial8mL on table at (450, 100) mm\n    block = Block on table at (450, -150) mm\n}}\n\n\
+         workflow run in bench {{\n    {lines}\n}}\n"
+    )
+}
+
+/// Writes such a lab; the folder of it.
+fn lab(name: &str, bore: &str, lines: &str) -> PathBuf {
+    let dir = folder(name);
+    write(&dir, "bench.mtx", bench(bore, lines));
+    dir
+}
+
+fn run(dir: &Path, more: &[&str]) -> Ended {
+    let mut all = vec!["run", "bench.mtx", "--fidelity", "motion"];
+    all.extend(more);
+    matterixc_in(dir, &all)
+}
+
+fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn program(text: String) -> Program {
+    let mut sources = Sources::default();
+    let file = sources.add("bench.mtx", text);
+    let (program, found) = compile(&mut sources, file, &LibraryOnly, &Options::default());
+    program.unwrap_or_else(|| panic!("{found:?}"))
+}
+
+/// The motions of a plan in its order, with what they depend on where that is constant.
+fn motions(program: &Program) -> Vec<(Motion, Vec<f64>)> {
+    let value =
+        |node| program.model.graph.eval_on(node, |leaf| if let Op::Const(value) = leaf { value } else { f64::NAN });
+    let mut out = Vec::new();
+    let mut todo = vec![program.plan.root];
+    while let Some(id) = todo.pop() {
+        let step = &program.plan.get(id).step;
+        if let Step::Operation(operation) = step
+            && let Some(motion) = &operation.motion
+        {
+            out.push((motion.clone(), motion.values().into_iter().map(value).collect()));
+        }
+        todo.extend(step.children().into_iter().rev());
+    }
+    out
+}
+
+/// How far a pose is from another one as a hand sees it, m.
+fn seen(hand: &Pose, a: &Pose, b: &Pose) -> [f64; 3] {
+    let (a, b) = (hand.inverse().point(a.position), hand.inverse().point(b.position));
+    [0, 1, 2].map(|k| b[k] - a[k])
+}
+
+/// How far a thing in hand is off as the hand sees it, m, and how much it is turned, rad.
+type Held = ([f64; 3], f64);
+
+/// How far the only thing was off that is picked, as the hand saw it before the fingers closed, and how far and how much turned, m
+/// and rad, after; or what ended that.
+fn picked(program: &Program, name: &str, by: f64, seed: u64) -> ([f64; 3], Result<Held, Stray>) {
+    let mut stage = Stage::new(program).expect("a stage");
+    let by = Perturbation { shift: by, turn: 0.02 };
+    let mut unseen = Unseen::drawn(program, by, seed).expect("it has room");
+    let [panda, thing] = ["panda", name].map(|name| program.scene.find(name).expect("it is there"));
+    let all = motions(program);
+    let grip = all.iter().position(|(motion, _)| matches!(motion, Motion::Grip { .. })).expect("a grip");
+    let mut there = Vec::new();
+    for (motion, values) in &all[..=grip] {
+        let before = stage.clone();
+        let performed = stage.perform(motion, values).expect("a way");
+        there.push((before, stage.clone(), motion.clone(), performed));
+    }
+    let (at_grip, ..) = &there[grip];
+    let real = unseen.in_stage(at_grip).pose(thing);
+    let off = seen(&stage.tip(panda), &at_grip.pose(thing), &real);
+    for (before, after, motion, performed) in &there {
+        if let Err(stray) = unseen.follow([before, after], motion, performed.as_ref()) {
+            return (off, Err(stray));
+        }
+    }
+    let (believed, real) = (stage.pose(thing), unseen.in_stage(&stage).pose(thing));
+    let ahead = believed.inverse().then(real);
+    let (from, to) = (ahead.position, ahead.point([1.0, 0.0, 0.0]));
+    (off, Ok((seen(&stage.tip(panda), &believed, &real), (to[1] - from[1]).atan2(to[0] - from[0]))))
+}
+
+#[test]
+fn fingers_centre_what_they_close_on_and_hit_what_is_further_off_than_they_are_open() {
+    let program = program(bench("20 mm", "pick vial by panda"));
+    let (mut within, mut beyond) = (0, 0);
+    for seed in 0..40 {
+        let (off, after) = picked(&program, "vial", 0.015, seed);
+        // The fingers are some 20 mm wide.
+        if off[0].abs() > 8e-3 {
+            continue;
+        }
+        // They open 10 mm further than the vial is wide on either side.
+        if off[1].abs() > 10e-3 {
+            let stray = after.expect_err("a finger hits it");
+            assert_eq!(stray.failure, "missed", "{seed}: {stray:?}");
+            beyond += 1;
+        } else {
+            let (after, turned) = after.unwrap_or_else(|stray| panic!("{seed}, {off:?}: {stray:?}"));
+            assert!(after[1].abs() < 1e-9, "{seed}: {after:?}");
+            assert!((after[0] - off[0]).abs() < 1e-9 && (after[2] - off[2]).abs() < 1e-9, "{seed}: {off:?} {after:?}");
+            assert!(turned != 0.0, "what is round stays turned");
+            within += 1;
+        }
+    }
+    assert!(within > 5 && beyond > 3, "{within} {beyond}");
+}
+
+#[test]
+fn flat_sides_turn_to_lie_against_the_fingers() {
+    let text = bench("20 mm", "pick rack by panda")
+        .replace("use std::vials::Vial8mL", "use std::vials::{Vial8mL, VialRack15}");
+    let text = text.replace("block = Block on", "rack = VialRack15 on");
+    let program = program(text);
+    for seed in 0..4 {
+        let (off, after) = picked(&program, "rack", 0.002, seed);
+        let (after, turned) = after.unwrap_or_else(|stray| panic!("{seed}, {off:?}: {stray:?}"));
+        assert!(after[1].abs() < 1e-9 && turned.abs() < 1e-9, "{seed}: {after:?} {turned}");
+        assert!(off[1].abs() > 1e-6 && (after[0] - off[0]).abs() < 1e-4, "{seed}: {off:?} {after:?}");
+    }
+}
+
+#[test]
+fn a_vial_within_the_room_of_the_fingers_is_picked_and_one_beyond_is_missed() {
+    let dir = lab("unseen_pick", "20 mm", "pick vial by panda\n    put back vial by panda");
+    let ended = run(&dir, &["--unseen", "2mm,1deg", "--out", "near"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    assert!(
+        ended.out.contains("`vial` really stands (") && ended.out.contains("from where it is taken to be"),
+        "{}",
+        ended.out
+    );
+    let judged = matterixc_in(&dir, &["verify", "near"]);
+    assert!(judged.out.contains("nothing wrong") && judged.out.contains("1 grips, off by "), "{}", judged.out);
+    assert!(!judged.out.contains("off by 0.00 mm"), "the recording has the true pose: {}", judged.out);
+
+    let ended = run(&dir, &["--unseen", "20mm", "--seed", "1"]);
+    let said = flat(&ended.err);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(said.contains("failed with `missed`"), "{said}");
+    assert!(
+        said.contains("into `vial` at (") && said.contains("`vial` is 21.5 mm from where it is taken to be"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_hole_centres_what_its_clearance_takes_and_refuses_the_rest() {
+    // 17 mm into 20 mm.
+    let dir = lab("unseen_hole", "20 mm", "insert vial into block[A1] by panda");
+    for seed in ["1", "2", "3"] {
+        let ended = run(&dir, &["--unseen", "0.5mm,1deg", "--seed", seed, "--out", "in"]);
+        assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+        let judged = matterixc_in(&dir, &["verify", "in"]);
+        assert!(judged.out.contains("nothing wrong"), "{}", judged.out);
+    }
+    let ended = run(&dir, &["--unseen", "2mm,1deg", "--out", "beside"]);
+    let said = flat(&ended.err);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(said.contains("failed with `collision`: `vial` hits the rim of `block[A1]`: it comes "), "{said}");
+    assert!(said.contains("off the middle of the hole, which leaves it 1.5 mm on either side"), "{said}");
+    // It stops at the rim, before its motion would have ended.
+    assert!(ended.out.contains("failed after 3.2"), "{}", ended.out);
+}
+
+#[test]
+fn the_same_seed_has_things_in_the_same_places_and_nothing_off_changes_nothing() {
+    let dir = lab("unseen_same", "20 mm", "insert vial into block[A1] by panda");
+    let bytes = |out: &str, more: &[&str]| {
+        let mut all = vec!["--out", out];
+        all.extend(more);
+        let ended = run(&dir, &all);
+        let files = ["recording.mcap", "report.json", "states.parquet", "plot.svg"];
+        let read = |file: &str| std::fs::read(dir.join(out).join(file)).expect("it is written");
+        (ended.out, files.map(read))
+    };
+    let plain = bytes("plain", &[]);
+    assert!(plain == bytes("zero", &["--unseen", "0mm,0deg"]), "nothing is off");
+    let off = bytes("off", &["--unseen", "1mm,1deg", "--seed", "3"]);
+    assert!(off == bytes("again", &["--unseen", "1 mm, 1 deg", "--seed", "3"]), "the same seed, the same lab");
+    assert!(off.0 != bytes("other", &["--unseen", "1mm,1deg", "--seed", "4"]).0);
+    // What is seen and what is not are drawn apart.
+    let both = bytes("both", &["--unseen", "0.5mm", "--perturb", "0.5mm"]);
+    let places: Vec<&str> = both.0.lines().filter(|l| l.contains("`vial` ") && l.contains("stands (")).collect();
+    assert_eq!(places.len(), 2, "{}", both.0);
+    let at = |line: &str| line.split_once('(').map(|l| l.1.split(')').next().unwrap_or_default().to_string());
+    assert_ne!(at(places[0]), at(places[1]), "{places:?}");
+}
+
+#[test]
+fn what_is_really_in_the_way_ends_a_motion() {
+    // A funnel goes into the neck of a flask, with little room.
+    let run = |seed: u32| {
+        let seed = seed.to_string();
+        let file = "examples/environments/funnel.mtx";
+        matterixc(&["run", file, "--fidelity", "motion", "--unseen", "2mm,1deg", "--seed", &seed])
+    };
+    let met = (1..=6).map(run).map(|ended| flat(&ended.err)).find(|said| said.contains("failed with `collision`"));
+    let said = met.expect("one of them is too far off");
+    let parts = [
+        "`funnel` of `panda` runs ",
+        " mm into `there` at (",
+        "`there` is ",
+        "`funnel` is ",
+        " mm from where it is taken to be",
+    ];
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+}
+
+#[test]
+fn a_thing_that_two_hands_hold_is_not_modelled() {
+    let ended = matterixc(&["run", "examples/handover.mtx", "--fidelity", "motion", "--unseen", "2mm,1deg"]);
+    assert_eq!(ended.code, 1);
+    assert!(flat(&ended.err).contains("is not modelled with `--unseen`"), "{}", ended.err);
+}
+
+#[test]
+fn what_cannot_be_read_is_refused() {
+    for wrong in ["20", "20mm,30mm", "5 s", "", "mm", "20mm,10deg,1", "-2mm"] {
+        let ended = matterixc(&["run", "examples/handover.mtx", "--fidelity", "motion", &format!("--unseen={wrong}")]);
+        assert_eq!(ended.code, 2, "{wrong}");
+    }
+    for other in [&["--fidelity", "process"][..], &["--fidelity", "motion", "--dry"], &[]] {
+        let mut all = vec!["run", "examples/handover.mtx", "--unseen", "2mm"];
+        all.extend(other);
+        let ended = matterixc(&all);
+        assert_eq!(ended.code, 2);
+        assert!(ended.err.contains("needs `--fidelity motion`"), "{}", ended.err);
+    }
+}
