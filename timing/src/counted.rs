@@ -20,7 +20,7 @@ impl Known<'_> {
         let begun = self.with(&set);
         let mut least = begun.time_until(until, &set);
         for event in self.events {
-            let written: BTreeSet<u32> = event.actions.iter().flat_map(assigns).collect();
+            let written: BTreeSet<u32> = event.actions.iter().filter_map(Action::assigned).collect();
             let counts = self.graph.depends(until, |op| matches!(op, Op::State(s) if written.contains(s)));
             if !counts && !written.iter().any(|s| set.contains_key(s)) {
                 continue;
@@ -82,12 +82,5 @@ impl Known<'_> {
             Action::Assign { state, value, .. } => Some((*state, self.number(*value).exact()?)),
             Action::Move { .. } => None,
         }
-    }
-}
-
-fn assigns(action: &Action) -> Option<u32> {
-    match action {
-        Action::Assign { state, .. } => Some(*state),
-        Action::Move { .. } => None,
     }
 }

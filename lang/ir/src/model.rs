@@ -142,6 +142,14 @@ impl Action {
             Action::Move { fraction, .. } => *fraction,
         }
     }
+
+    /// The state that it assigns.
+    pub fn assigned(&self) -> Option<u32> {
+        match self {
+            Action::Assign { state, .. } => Some(*state),
+            Action::Move { .. } => None,
+        }
+    }
 }
 
 /// Actions that happen, in order, each time `when` becomes true; true at the start counts as becoming true.

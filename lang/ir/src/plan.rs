@@ -370,15 +370,10 @@ impl Operation {
         self.takes.is_none() && self.until.is_none()
     }
 
-    /// The states it assigns; none where it moves matter, which changes more than these.
-    fn assigned(&self) -> Option<Vec<u32>> {
+    /// The states it assigns; none where it moves matter, which changes more than these, or has no effects.
+    pub fn assigned(&self) -> Option<Vec<u32>> {
         let actions = self.at_start.iter().chain(&self.at_end);
-        let assigned: Option<Vec<u32>> = actions
-            .map(|action| match action {
-                Action::Assign { state, .. } => Some(*state),
-                Action::Move { .. } => None,
-            })
-            .collect();
+        let assigned: Option<Vec<u32>> = actions.map(Action::assigned).collect();
         // Of a command without effects nobody knows what it changes.
         assigned.filter(|states| !states.is_empty())
     }

@@ -38,10 +38,7 @@ impl Planner<'_, '_> {
             Step::Operation(operation) => Some(operation),
             _ => None,
         });
-        let assigned = operations.flat_map(|o| o.at_start.iter().chain(&o.at_end)).filter_map(|action| match action {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        });
+        let assigned = operations.flat_map(|o| o.at_start.iter().chain(&o.at_end)).filter_map(Action::assigned);
         let truths: BTreeSet<u32> =
             assigned.filter(|state| self.lab.states[*state as usize].domain == Domain::Bool).collect();
         let mut out: BTreeMap<InstanceId, Vec<(u32, Arc<Condition>)>> = BTreeMap::new();

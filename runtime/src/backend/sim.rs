@@ -477,10 +477,7 @@ impl<'m> Sim<'m> {
         };
         let ticket = Ticket(self.started);
         self.started += 1;
-        let assigned = operation.at_start.iter().filter_map(|action| match action {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        });
+        let assigned = operation.at_start.iter().filter_map(Action::assigned);
         let (set, at_end, motion) = (assigned.collect(), operation.at_end.clone(), operation.motion.clone());
         self.running.insert(ticket, Running { ends, set, at_end, motion });
         Ok(ticket)

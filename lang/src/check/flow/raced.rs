@@ -250,10 +250,7 @@ impl<'p> Interpreter<'p, '_> {
             return Vec::new();
         }
         let actions = operations.iter().flat_map(|(o, _)| o.at_start.iter().chain(&o.at_end));
-        let assigned = actions.filter_map(|action| match action {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        });
+        let assigned = actions.filter_map(Action::assigned);
         let rates = assigned.filter_map(|s| self.rates_of.get(&s)).flatten();
         let moved: BTreeSet<u32> =
             rates.map(|i| self.derivatives[*i as usize].state).filter(|s| self.amounts.contains(s)).collect();

@@ -121,10 +121,7 @@ impl Interpreter<'_, '_> {
             return;
         }
         let ends_of = self.ends_of();
-        let set = operation.at_start.iter().chain(&operation.at_end).filter_map(|action| match action {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        });
+        let set = operation.at_start.iter().chain(&operation.at_end).filter_map(Action::assigned);
         let set: BTreeSet<u32> = set.collect();
         let ends: BTreeSet<usize> = set.iter().filter_map(|s| ends_of.get(s)).flatten().copied().collect();
         let (plan, span, since) = (self.plan, self.site(), began.bounds());

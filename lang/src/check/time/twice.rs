@@ -196,12 +196,7 @@ fn harmless(times: &Times<'_>, a: StepId, b: StepId) -> bool {
 /// The states that a step and what is below it assign.
 fn written(plan: &Plan, step: StepId) -> BTreeSet<u32> {
     let actions = operations(plan, step).into_iter().flat_map(|o| o.at_start.iter().chain(&o.at_end));
-    actions
-        .filter_map(|action| match action {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        })
-        .collect()
+    actions.filter_map(Action::assigned).collect()
 }
 
 /// The operations of a step and of what is below it.

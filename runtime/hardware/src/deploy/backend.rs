@@ -212,15 +212,7 @@ impl Hardware<'_, '_> {
         let ready = until.is_none() || self.is_dry();
         let changed = exchange.is_some();
         let actions = if ready { &[][..] } else { &operation.at_end };
-        let set: Vec<u32> = operation
-            .at_start
-            .iter()
-            .chain(actions)
-            .filter_map(|a| match a {
-                Action::Assign { state, .. } => Some(*state),
-                Action::Move { .. } => None,
-            })
-            .collect();
+        let set: Vec<u32> = operation.at_start.iter().chain(actions).filter_map(Action::assigned).collect();
         if changed && failed.is_none() && ready && self.is_live() {
             self.read_back(device, &set, false)?;
         }

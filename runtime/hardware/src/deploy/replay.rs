@@ -141,7 +141,7 @@ impl Hardware<'_, '_> {
         let planned = self.program.plan.get(step);
         let Step::Operation(operation) = &planned.step else { return Ok(()) };
         if self.is_repeatable(operation, step) {
-            self.half_said = operation.at_start.iter().chain(&operation.at_end).filter_map(assigned).collect();
+            self.half_said = operation.at_start.iter().chain(&operation.at_end).filter_map(Action::assigned).collect();
             return Ok(());
         }
         self.refused.set(true);
@@ -159,20 +159,12 @@ impl Hardware<'_, '_> {
     /// does that sets nothing is not known.
     pub(super) fn is_repeatable(&self, operation: &Operation, step: StepId) -> bool {
         let lasts = self.devices.iter().filter_map(|d| d.driver?.call(step)).any(|e| e.until.is_some());
-        let all = || operation.at_start.iter().chain(&operation.at_end);
-        let set: Vec<u32> = all().filter_map(assigned).collect();
         let graph = &self.program.model.graph;
-        let is_set = |op: Op| matches!(op, Op::State(state) if set.contains(&state));
-        let rests = |action: &Action| graph.schedule([action.source()]).into_iter().any(|node| is_set(graph.op(node)));
-        let only_sets = !set.is_empty() && all().all(|action| assigned(action).is_some() && !rests(action));
+        let rests = |set: &[u32]| {
+            let is_set = |op: &Op| matches!(op, Op::State(state) if set.contains(state));
+            operation.at_start.iter().chain(&operation.at_end).any(|action| graph.depends(action.source(), is_set))
+        };
+        let only_sets = operation.assigned().is_some_and(|set| !rests(&set));
         !lasts && operation.until.is_none() && only_sets
-    }
-}
-
-/// The state that an action sets.
-fn assigned(action: &Action) -> Option<u32> {
-    match action {
-        Action::Assign { state, .. } => Some(*state),
-        Action::Move { .. } => None,
     }
 }

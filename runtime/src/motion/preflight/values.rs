@@ -33,10 +33,7 @@ impl Values {
     /// When the run begins. What an event changes is not known, as nobody says when.
     pub fn at_start(program: &Program) -> Self {
         let model = &program.model;
-        let changes = model.events.iter().flat_map(|e| &e.actions).filter_map(|a| match a {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        });
+        let changes = model.events.iter().flat_map(|e| &e.actions).filter_map(Action::assigned);
         let changes: BTreeSet<u32> = changes.collect();
         let mut out = Values {
             by_state: model.states.iter().map(|_| None).collect(),
