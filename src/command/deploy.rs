@@ -17,7 +17,7 @@ use matterix_ir::{Diagnostic, FileId, Program};
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
 use crate::panel::{Board, Panel, Watcher};
-use crate::pipeline::{self, Calibration, Choices, DeployPlan, Gauged, Input, Keep, Options, Wires};
+use crate::pipeline::{self, Calibration, Choices, DeployPlan, Gauged, Input, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::reads::Account;
 use crate::record::{About, Bound, Folder, Gauge, Taken};
@@ -72,16 +72,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let cancel = cancel::on_interrupt()?;
     if args.mode == DeployMode::SimFirst && !args.resume {
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
-        let (fidelity, dry) = (Fidelity::Process, false);
-        let choices = Choices {
-            seed: args.seed,
-            fidelity,
-            dry,
-            turns: Vec::new(),
-            moved: Vec::new(),
-            unseen: matterix_runtime::motion::Unseen::default(),
-            keep: Keep::Ends,
-        };
+        let choices = Choices::plain(args.seed, Fidelity::Process);
         let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
         let (passed, end) = (ran.passed, ran.end_time());
         findings.show(&sources, ran.diagnostics.clone());
@@ -104,7 +95,8 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     }
     if mode != Mode::Dry {
         keys::heed_signals(&CONTROL).map_err(|e| format!("cannot listen for signals: {e}"))?;
-        if !keys::listen(&CONTROL, args.yes || args.view) && !args.yes && !args.view {
+        let others_may_answer = args.yes || args.view;
+        if !keys::listen(&CONTROL, others_may_answer) && !others_may_answer {
             CONTROL.answer_all(Answer::of_nobody());
         }
     }

@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, Sources};
 use serde_json::{Value, json};
 
 use crate::args::{Color, Fidelity, TestArgs, TestFormat};
-use crate::pipeline::{self, Choices, Input, Keep, Test};
+use crate::pipeline::{self, Choices, Input, Test};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Look, Reporter};
 use crate::terminal::{self, Stream, paint, print, print_error};
@@ -98,15 +98,7 @@ impl Trial {
             return self.tell(file, sources, test, None, found);
         };
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
-        let choices = Choices {
-            seed: self.seed,
-            fidelity: Fidelity::Process,
-            dry: false,
-            turns: Vec::new(),
-            moved: Vec::new(),
-            unseen: matterix_runtime::motion::Unseen::default(),
-            keep: Keep::Ends,
-        };
+        let choices = Choices::plain(self.seed, Fidelity::Process);
         let ran = pipeline::run(program, sources, &choices, self.cancel, &mut progress);
         progress.finish();
         let found = if ran.passed { test.diagnostics.clone() } else { ran.diagnostics.clone() };

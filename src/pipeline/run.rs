@@ -58,6 +58,12 @@ pub struct Choices {
 }
 
 impl Choices {
+    /// Things where they are said to be, no turns, and no more kept than how it ends.
+    pub fn plain(seed: u64, fidelity: args::Fidelity) -> Self {
+        let (turns, moved, unseen) = (Vec::new(), Vec::new(), Unseen::default());
+        Choices { seed, fidelity, dry: false, turns, moved, unseen, keep: Keep::Ends }
+    }
+
     fn fidelity(&self) -> Fidelity {
         match self.fidelity {
             _ if self.dry => Fidelity::Dry,

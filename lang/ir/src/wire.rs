@@ -340,6 +340,12 @@ pub struct Driver {
 }
 
 impl Driver {
+    /// What a deployment says apart from commands and questions of the plan.
+    pub fn said_apart(&self) -> impl Iterator<Item = &Exchange> {
+        let identities = self.identity.iter().map(|identity| &identity.exchange);
+        identities.chain([&self.open, &self.close, &self.halt, &self.safe].into_iter().flatten())
+    }
+
     /// What is said for an operation of the plan.
     pub fn call(&self, step: StepId) -> Option<&Exchange> {
         self.calls.iter().find(|(s, _)| *s == step).map(|(_, exchange)| exchange)

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::codes;
-use matterix_ir::model::{Action, Load, Model};
+use matterix_ir::model::{Action, Model};
 use matterix_ir::plan::{Motion, Operation, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
@@ -40,8 +40,6 @@ pub struct Sim<'m> {
     befallen: Option<(&'static str, String)>,
     /// How far things are from where the stage has them; none where nothing is.
     unseen: Option<Unseen>,
-    /// What ends the motion that has just been planned, with what is really there.
-    stray: Option<Stray>,
     /// What has been told of what robots carry.
     carried: Told,
     /// Laws move parts of things.
@@ -68,6 +66,16 @@ struct Running {
     set: Vec<u32>,
     at_end: Vec<Action>,
     motion: Option<Motion>,
+}
+
+/// What becomes of the motion of an operation.
+enum Moving {
+    /// It takes so long, s.
+    Lasts(f64),
+    /// It takes no time, or there is none.
+    AtOnce,
+    /// What is really there ends it; when, s since the run began.
+    Strays(Stray),
 }
 
 /// When an operation ends.
@@ -104,7 +112,7 @@ impl<'m> Sim<'m> {
         let (moves, befallen, carried) = (Moves::default(), None, Told::default());
         let (moments, stage, started) = (Moments::default(), None, 0);
         let turning = false;
-        let (unseen, stray) = (None, None);
+        let unseen = None;
         Sim {
             stage,
             moves,
@@ -116,7 +124,6 @@ impl<'m> Sim<'m> {
             started,
             befallen,
             unseen,
-            stray,
             carried,
             turning,
             sampled,
@@ -253,9 +260,9 @@ impl<'m> Sim<'m> {
         self.engine.eval_with(node, &states)
     }
 
-    /// Carries out the motion of an operation; how long it takes, if it takes time.
-    fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
-        let Some(motion) = operation.motion.as_ref().filter(|_| self.moves.robots) else { return Ok(None) };
+    /// Carries out the motion of an operation.
+    fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Moving, Refused> {
+        let Some(motion) = operation.motion.as_ref().filter(|_| self.moves.robots) else { return Ok(Moving::AtOnce) };
         let motion = motion.chosen(|node| Some(self.engine.eval(node))).unwrap_or_else(|| motion.clone());
         let led = self.stage.as_ref().and_then(|stage| stage.led_by(&motion));
         let values: Vec<f64> = match led {
@@ -265,13 +272,11 @@ impl<'m> Sim<'m> {
         if let Some(text) = self.look_at_carried(out) {
             self.befallen.get_or_insert(("spilled", text));
         }
-        let Some(stage) = self.stage.as_mut() else { return Ok(None) };
+        let Some(stage) = self.stage.as_mut() else { return Ok(Moving::AtOnce) };
         stage.come_to(self.engine.time());
-        let held = self.prepared.model.loads.iter().filter(|load| stage.held_by(load.instance).is_some());
         let value = |node: Option<NodeId>| node.map(|node| self.engine.eval(node));
-        let burden = |load: &Load| Burden::of(load, value);
-        let burdens: Vec<_> = held.map(|load| (load.instance, burden(load))).collect();
-        stage.burden(burdens);
+        let held = carried(&self.prepared.model.loads, stage).into_iter();
+        stage.burden(held.map(|load| (load.instance, Burden::of(load, value))).collect::<Vec<_>>());
         stage.keep_time(tempi(&self.prepared.model.paces, |node| Some(self.engine.eval(node))));
         let now = self.engine.time();
         let before = self.unseen.as_ref().map(|_| stage.clone());
@@ -284,8 +289,7 @@ impl<'m> Sim<'m> {
                 let real = unseen.in_stage(stage);
                 out.travels(&stage.moments_until(&real, performed, [now, stray.at], FRAME));
             }
-            self.stray = Some(Stray { at: now + stray.at, ..stray });
-            return Ok(None);
+            return Ok(Moving::Strays(Stray { at: now + stray.at, ..stray }));
         }
         let real = self.unseen.as_ref().map(|unseen| unseen.in_stage(stage));
         let there = real.as_ref().unwrap_or(stage);
@@ -295,21 +299,19 @@ impl<'m> Sim<'m> {
                 let robots = [*by, *on].into_iter().filter_map(|id| there.hand_of(id));
                 out.travels(&robots.filter_map(|robot| there.moment(robot, now)).collect::<Vec<_>>());
             }
-            return Ok(None);
+            return Ok(Moving::AtOnce);
         };
         out.travels(&there.moments(&performed, now, FRAME));
-        Ok(Some(performed.duration()))
+        Ok(Moving::Lasts(performed.duration()))
     }
 
     /// How an operation with a motion goes on. One that another robot is in the way of waits for it to go away, no
     /// longer than the bounds of its duration allow; `begun` is when it first tried, s.
     fn attempt(&mut self, operation: &Operation, begun: f64, out: &mut dyn Listener) -> Result<Ends, Fault> {
         let refused = match self.perform(operation, out) {
-            Ok(Some(duration)) => return Ok(Ends::At(self.moment_after(self.rest(operation) + duration))),
-            Ok(None) => match self.stray.take() {
-                Some(stray) => return Ok(Ends::Strays(stray.at, stray.failure, stray.text)),
-                None => return self.end_of(operation, out),
-            },
+            Ok(Moving::Lasts(duration)) => return Ok(Ends::At(self.moment_after(self.rest(operation) + duration))),
+            Ok(Moving::Strays(stray)) => return Ok(Ends::Strays(stray.at, stray.failure, stray.text)),
+            Ok(Moving::AtOnce) => return self.end_of(operation, out),
             Err(refused) => refused,
         };
         let (now, stage) = (self.engine.time(), self.stage.as_ref());

@@ -357,32 +357,33 @@ impl Stage<'_> {
 
     /// How a thing in hand is moved on a way that begins as things stand now.
     fn ride(&self, performed: &Performed, held: InstanceId, surface: f64) -> Ride {
-        let mut stage = self.clone();
         let thing = self.scene.get(held);
         let middle = match &thing.inertial {
             Some(inertial) => inertial.placement.position,
             None => [0.0, 0.0, thing.shape.as_ref().map_or(0.0, |shape| 0.5 * shape.size()[2])],
         };
-        let duration = performed.duration();
-        let steps = (duration / APART).ceil().max(1.0) as u32;
-        let mut ride = Ride {
-            apart: duration / f64::from(steps),
-            way: Vec::new(),
-            axes: Vec::new(),
-            middles: Vec::new(),
+        let (apart, places) = self.along(performed, |stage| stage.pose(held));
+        let axis = |at: &Pose| [0, 1, 2].map(|k| at.point([0.0, 0.0, 1.0])[k] - at.position[k]);
+        Ride {
+            apart,
+            way: places.iter().map(|at| at.point([0.0, 0.0, surface])).collect(),
+            axes: places.iter().map(axis).collect(),
+            middles: places.iter().map(|at| at.point(middle)).collect(),
             over: 0,
-        };
-        for step in 0..=steps {
-            let since = duration * f64::from(step) / f64::from(steps);
-            if let Some(actor) = stage.actors.get_mut(&performed.robot) {
-                performed.bring(actor, since);
-            }
-            let at: Pose = stage.pose(held);
-            ride.way.push(at.point([0.0, 0.0, surface]));
-            ride.axes.push([0, 1, 2].map(|k| at.point([0.0, 0.0, 1.0])[k] - at.position[k]));
-            ride.middles.push(at.point(middle));
         }
-        ride
+    }
+
+    /// What is so at moments of a motion that are evenly apart, from its beginning to its end, and how far apart they are, s.
+    pub(super) fn along<T>(&self, performed: &Performed, look: impl Fn(&Stage<'_>) -> T) -> (f64, Vec<T>) {
+        let (mut stage, duration) = (self.clone(), performed.duration());
+        let steps = (duration / APART).ceil().max(1.0) as u32;
+        let at = |step: u32| {
+            if let Some(actor) = stage.actors.get_mut(&performed.robot) {
+                performed.bring(actor, duration * f64::from(step) / f64::from(steps));
+            }
+            look(&stage)
+        };
+        (duration / f64::from(steps), (0..=steps).map(at).collect())
     }
 }
 

@@ -21,17 +21,12 @@ impl Stage<'_> {
     /// Carries out a motion, as slowly as what the robot holds needs so that nothing runs over. `values` are those of
     /// [`Motion::values`], SI.
     pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
-        if self.burdens.is_empty() {
-            let performed = self.carry_out(motion, values)?;
-            return Ok(performed.map(|performed| self.in_time(motion, performed)));
-        }
-        let before = self.clone();
-        match self.carry_out(motion, values)? {
-            Some(performed) => {
-                let performed = self.in_time(motion, performed);
-                self.calmed(&before, motion, performed).map(Some)
-            }
-            None => Ok(None),
+        let before = (!self.burdens.is_empty()).then(|| self.clone());
+        let Some(performed) = self.carry_out(motion, values)? else { return Ok(None) };
+        let performed = self.in_time(motion, performed);
+        match before {
+            Some(before) => self.calmed(&before, motion, performed).map(Some),
+            None => Ok(Some(performed)),
         }
     }
 

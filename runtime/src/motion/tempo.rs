@@ -10,9 +10,6 @@ use matterix_ir::scene::InstanceId;
 use super::performed::Performed;
 use super::stage::Stage;
 
-/// How far apart in time the speed of a tip is measured, s.
-const APART: f64 = 0.005;
-
 /// How fast a robot is meant to go.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tempo {
@@ -41,9 +38,8 @@ impl Stage<'_> {
     /// A motion as slow as its robot is meant to go; hands open and close as fast as ever.
     pub(super) fn in_time(&self, motion: &Motion, performed: Performed) -> Performed {
         match motion {
-            Motion::Grip { .. } | Motion::Free { .. } | Motion::Fingers { .. } => performed,
-            // It is as slow by now, and as slow beyond that as it pours.
-            Motion::Tilted { .. } => performed,
+            // What is tilted is as slow by now, and as slow beyond that as it pours.
+            Motion::Grip { .. } | Motion::Free { .. } | Motion::Fingers { .. } | Motion::Tilted { .. } => performed,
             _ => self.slowed(performed),
         }
     }
@@ -57,20 +53,9 @@ impl Stage<'_> {
 
     /// The greatest speed of a robot's tip on a motion, m/s.
     fn tip_speed(&self, performed: &Performed) -> f64 {
-        let (mut stage, robot, duration) = (self.clone(), performed.robot, performed.duration());
-        let steps = (duration / APART).ceil().max(1.0) as u32;
-        let mut tip = |step: u32| {
-            if let Some(actor) = stage.actors.get_mut(&robot) {
-                performed.bring(actor, duration * f64::from(step) / f64::from(steps));
-            }
-            stage.tip(robot).position
-        };
-        let (mut before, mut most) = (tip(0), 0.0_f64);
-        for step in 1..=steps {
-            let now = tip(step);
-            let way = before.iter().zip(now).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();
-            (before, most) = (now, most.max(way));
-        }
-        if duration > 0.0 { most * f64::from(steps) / duration } else { 0.0 }
+        let (apart, tips) = self.along(performed, |stage| stage.tip(performed.robot).position);
+        let way = |pair: &[[f64; 3]]| pair[0].iter().zip(pair[1]).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();
+        let most = tips.windows(2).map(way).fold(0.0, f64::max);
+        if apart > 0.0 { most / apart } else { 0.0 }
     }
 }

@@ -15,7 +15,7 @@ use crate::args::Fidelity;
 use crate::mcp::answer::{Answer, bounded, pruned};
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
-use crate::pipeline::{self, Choices, Keep};
+use crate::pipeline::{self, Choices};
 use crate::progress::{Kind, Progress};
 
 #[derive(Deserialize, JsonSchema)]
@@ -86,15 +86,7 @@ impl Task for Run {
                 return unrun(&sources, found);
             }
         }
-        let choices = Choices {
-            seed: self.seed,
-            fidelity,
-            dry: false,
-            turns: Vec::new(),
-            moved: Vec::new(),
-            unseen: matterix_runtime::motion::Unseen::default(),
-            keep: Keep::Ends,
-        };
+        let choices = Choices::plain(self.seed, fidelity);
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
         let ran = pipeline::run(&program, &sources, &choices, stop, &mut progress);
         found.extend(ran.diagnostics.iter().cloned());

@@ -21,8 +21,7 @@ impl<'a> Planner<'a, '_> {
         }
         let known: BTreeSet<String> =
             wires.iter().chain(under.map_or(&[][..], |u| u.wires)).flat_map(kept_by).collect();
-        driver.identity.iter().for_each(|identity| self.check_exchange(&identity.exchange, &known));
-        let exchanges = [&driver.open, &driver.close, &driver.halt, &driver.safe, &driver.play].into_iter().flatten();
+        let exchanges = driver.said_apart().chain(&driver.play);
         let served = driver.served.iter().chain(driver.alive.iter().map(|a| &a.repeated)).map(|s| &s.exchange);
         for exchange in exchanges.chain(served) {
             self.check_exchange(exchange, &known);

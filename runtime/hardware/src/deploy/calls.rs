@@ -28,10 +28,7 @@ impl Hardware<'_, '_> {
         let asked = asked_for(self.program, &self.observed);
         for (device, driver, link) in (0..self.devices.len()).filter_map(|index| self.spoken_to(index)) {
             let cannot = |what: &str, why: &str| format!("`{}` cannot {what} `{}`: {why}", driver.name, device.name);
-            let identities = driver.identity.iter().map(|identity| &identity.exchange);
-            for exchange in
-                identities.chain([&driver.open, &driver.close, &driver.halt, &driver.safe].into_iter().flatten())
-            {
+            for exchange in driver.said_apart() {
                 let wrong = self.refused(exchange, link);
                 found.extend(wrong.into_iter().map(|why| finding(exchange.span, &cannot("speak to", &why))));
             }
