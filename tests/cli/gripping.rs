@@ -16,6 +16,11 @@ fn program(gripper: &str, things: &str, lines: &str) -> Program {
          panda = FrankaPanda {{ gripper: {gripper} {{}} }} on table at (0, 0) mm\n    {things}\n}}\n\
          workflow run in bench {{\n    {lines}\n}}\n"
     );
+    compiled(text)
+}
+
+/// The program of a text.
+pub fn compiled(text: String) -> Program {
     let mut sources = Sources::default();
     let file = sources.add("bench.mtx", text);
     let (program, found) = compile(&mut sources, file, &LibraryOnly, &Options::default());
@@ -33,7 +38,7 @@ fn at_first(program: &Program, node: NodeId) -> f64 {
 }
 
 /// The motions of a program in the order of the plan, with the values they depend on, as they are at first.
-fn motions(program: &Program) -> Vec<(Motion, Vec<f64>)> {
+pub fn motions(program: &Program) -> Vec<(Motion, Vec<f64>)> {
     let value = |node| at_first(program, node);
     let mut out = Vec::new();
     let mut todo = vec![program.plan.root];

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use matterix_ir::plan::{Motion, Step};
+use matterix_ir::Program;
+use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
-use matterix_ir::{Op, Program, Sources};
-use matterix_lang::{LibraryOnly, Options, compile};
 use matterix_runtime::motion::{Perturbation, Stage, Stray, Unseen};
 
+use crate::gripping::{compiled, motions};
 use crate::harness::{Ended, folder, matterixc, matterixc_in, write};
 
 /// A vial of 17 mm on a table, and a block with a hole of this width.
@@ -39,31 +39,6 @@ fn run(dir: &Path, more: &[&str]) -> Ended {
 
 fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn program(text: String) -> Program {
-    let mut sources = Sources::default();
-    let file = sources.add("bench.mtx", text);
-    let (program, found) = compile(&mut sources, file, &LibraryOnly, &Options::default());
-    program.unwrap_or_else(|| panic!("{found:?}"))
-}
-
-/// The motions of a plan in its order, with what they depend on where that is constant.
-fn motions(program: &Program) -> Vec<(Motion, Vec<f64>)> {
-    let value =
-        |node| program.model.graph.eval_on(node, |leaf| if let Op::Const(value) = leaf { value } else { f64::NAN });
-    let mut out = Vec::new();
-    let mut todo = vec![program.plan.root];
-    while let Some(id) = todo.pop() {
-        let step = &program.plan.get(id).step;
-        if let Step::Operation(operation) = step
-            && let Some(motion) = &operation.motion
-        {
-            out.push((motion.clone(), motion.values().into_iter().map(value).collect()));
-        }
-        todo.extend(step.children().into_iter().rev());
-    }
-    out
 }
 
 /// How far a pose is from another one as a hand sees it, m.
@@ -106,7 +81,7 @@ fn picked(program: &Program, name: &str, by: f64, seed: u64) -> ([f64; 3], Resul
 
 #[test]
 fn fingers_centre_what_they_close_on_and_hit_what_is_further_off_than_they_are_open() {
-    let program = program(bench("20 mm", "pick vial by panda"));
+    let program = compiled(bench("20 mm", "pick vial by panda"));
     let (mut within, mut beyond) = (0, 0);
     for seed in 0..40 {
         let (off, after) = picked(&program, "vial", 0.015, seed);
@@ -135,7 +110,7 @@ fn flat_sides_turn_to_lie_against_the_fingers() {
     let text = bench("20 mm", "pick rack by panda")
         .replace("use std::vials::Vial8mL", "use std::vials::{Vial8mL, VialRack15}");
     let text = text.replace("block = Block on", "rack = VialRack15 on");
-    let program = program(text);
+    let program = compiled(text);
     for seed in 0..4 {
         let (off, after) = picked(&program, "rack", 0.002, seed);
         let (after, turned) = after.unwrap_or_else(|stray| panic!("{seed}, {off:?}: {stray:?}"));

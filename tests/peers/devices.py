@@ -85,14 +85,23 @@ def serve(simulator, end, back):
     return f"127.0.0.1:{listener.getsockname()[1]}", heard
 
 
+def bench(name, text, device, address, more=""):
+    """A folder with a program and bindings of its one device."""
+    folder = pathlib.Path(FOLDER, name)
+    folder.mkdir(parents=True)
+    (folder / "lab.mtx").write_text(text)
+    (folder / "lab.toml").write_text(f'[{device}]\naddress = "{address}"\n{more}')
+    return folder
+
+
+def deployment(speed=SPEED):
+    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", str(speed)]
+    return [COMMAND, "deploy", "lab.mtx", *arguments]
+
+
 def deploy(name, text, device, address, more=""):
-    folder = os.path.join(FOLDER, name)
-    os.makedirs(folder)
-    for file, content in (("lab.mtx", text), ("lab.toml", f'[{device}]\naddress = "{address}"\n{more}')):
-        with open(os.path.join(folder, file), "w") as out:
-            out.write(content)
-    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", str(SPEED)]
-    return subprocess.run([COMMAND, "deploy", "lab.mtx", *arguments], cwd=folder, capture_output=True, text=True)
+    folder = bench(name, text, device, address, more)
+    return subprocess.run(deployment(), cwd=folder, capture_output=True, text=True)
 
 
 def emulator(*arguments):
@@ -151,12 +160,8 @@ def stopped():
 
 def interrupted(name, text, device, address, when, more=""):
     """A deployment that is stopped as soon as something is so."""
-    folder = os.path.join(FOLDER, name)
-    os.makedirs(folder)
-    for file, content in (("lab.mtx", text), ("lab.toml", f'[{device}]\naddress = "{address}"\n{more}')):
-        pathlib.Path(folder, file).write_text(content)
-    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", "1"]
-    process = subprocess.Popen([COMMAND, "deploy", "lab.mtx", *arguments], cwd=folder, stderr=subprocess.PIPE, text=True)
+    folder = bench(name, text, device, address, more)
+    process = subprocess.Popen(deployment(1), cwd=folder, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 60
     while time.monotonic() < until and not when():
         time.sleep(0.02)
@@ -221,12 +226,7 @@ def killed():
 
 def gone_on_with(name, text, device, address, after, more=""):
     """What became of a deployment that was killed so many s after its journal was begun, and gone on with."""
-    folder = pathlib.Path(FOLDER, name)
-    folder.mkdir()
-    for file, content in (("lab.mtx", text), ("lab.toml", f'[{device}]\naddress = "{address}"\n{more}')):
-        (folder / file).write_text(content)
-    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", str(SPEED)]
-    command = [COMMAND, "deploy", "lab.mtx", *arguments]
+    folder, command = bench(name, text, device, address, more), deployment()
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while not (folder / "journal").exists() and process.poll() is None:
         time.sleep(0.002)
