@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, IsTerminal};
 
-use matterix_hardware::deploy::{Answer, Control, Gate, Notice};
+use matterix_hardware::deploy::{Answer, Control, Gate, Notice, Taken};
 
 use crate::cancel;
 use crate::terminal::{Stream, print};
@@ -14,6 +14,7 @@ pub const STILL_PAUSED: &str = "it was paused and still is: r and Enter goes on,
 const GOING_ON: &str = "going on\n";
 const STEPPING: &str = "one step\n";
 const HINT: &str = "q and Enter stops, p pauses, r goes on, s lets one step begin\n";
+const OVERTAKEN: &str = "that answers nothing: the question before was withdrawn, or answered elsewhere\n";
 const CONFIRM: &str = "type y and Enter to confirm, n to stop: ";
 
 /// Who does not confirm what is asked when the terminal has gone.
@@ -38,17 +39,15 @@ enum Word {
 /// Shows a question, and how to answer it where somebody has to.
 pub fn show(notice: Notice<'_>) {
     let text = match notice {
-        Notice::Asked(text, true) => format!("{text}\n{CONFIRM}"),
-        Notice::Asked(text, false) => format!("{text}\n"),
+        Notice::Prompt(text) => format!("{text}\n{CONFIRM}"),
+        Notice::Waits(text) => format!("\nasked next: {text}\nfirst the question before: {CONFIRM}"),
+        Notice::Answered(text) => format!("{text}\n"),
+        Notice::Heard(text, answer) => {
+            format!("{} by {}: {text}\n", if answer.yes { "confirmed" } else { "not confirmed" }, answer.who)
+        }
         Notice::Withdrawn(text) => format!("\nno longer asked: {text}\n"),
     };
     print(Stream::Err, &text);
-}
-
-/// Shows the question that is to be answered now, after another one was withdrawn.
-fn show_again(control: &Control) {
-    let now = control.open().first().map(|(_, text)| format!("{text}\n{CONFIRM}")).unwrap_or_default();
-    print(Stream::Err, &format!("that answers nothing: a question was withdrawn meanwhile\n{now}"));
 }
 
 /// Listens from here on; false where standard input is no terminal.
@@ -166,18 +165,21 @@ pub fn heed_signals(_: &'static Control) -> std::io::Result<()> {
 
 fn obey(line: &str, control: &Control) {
     let who = person();
-    let answer = |yes| {
-        control.open().first().is_some_and(|(question, _)| control.answer(*question, Answer { yes, who: who.clone() }))
-    };
-    match meant(line) {
+    let word = meant(line);
+    match word {
         Word::Stop => stop(&who, control),
         Word::Gate(to) => gate(to, &who, control),
-        // Whoever types may not have seen that another question is asked by now.
-        Word::Yes | Word::No if control.is_overtaken() => show_again(control),
-        Word::Yes if answer(true) => {}
-        Word::No if answer(false) => {}
-        _ if !control.open().is_empty() => print(Stream::Err, CONFIRM),
-        _ => print(Stream::Err, HINT),
+        Word::Yes | Word::No => match control.answer_prompted(Answer { yes: word == Word::Yes, who }) {
+            Taken::Yes => {}
+            // Whoever types may not have seen that another question is asked by now.
+            Taken::Overtaken => {
+                print(Stream::Err, OVERTAKEN);
+                control.prompt_again();
+            }
+            Taken::Nothing => print(Stream::Err, HINT),
+        },
+        Word::Other if !control.open().is_empty() => print(Stream::Err, CONFIRM),
+        Word::Other => print(Stream::Err, HINT),
     }
 }
 
@@ -244,5 +246,21 @@ mod tests {
         assert_eq!(CONTROL.answered(5), None);
         obey("y", &CONTROL);
         assert_eq!(CONTROL.answered(5).map(|a| a.yes), Some(true));
+    }
+
+    #[test]
+    fn an_answer_to_a_question_that_was_just_answered_on_the_page_is_not_that_to_the_next() {
+        static CANCEL: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
+        static CONTROL: Control = Control::new(&CANCEL, |_| {});
+        let page = |question| CONTROL.answer(question, Answer { yes: true, who: "Ann, on the page".to_owned() });
+        for (n, text) in [(1, "is the bottle under the pump?"), (2, "is the flask on?"), (3, "is the hood closed?")] {
+            CONTROL.ask(n, text);
+        }
+        assert!(page(1));
+        obey("y", &CONTROL);
+        assert_eq!(CONTROL.answered(2), None, "it was meant for the first");
+        assert!(page(3), "one that was not prompted for overtakes nobody");
+        obey("y", &CONTROL);
+        assert_eq!(CONTROL.answered(2).map(|a| a.who), Some(person()));
     }
 }

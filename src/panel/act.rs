@@ -73,10 +73,9 @@ fn reply(act: &Act, who: String, control: &Control) -> Answer {
         return Answer::text(422, "say which question: `\"question\": \"3\"`");
     };
     let yes = act.what == What::Yes;
-    if !control.answer(question, Said { yes, who: who.clone() }) {
+    if !control.answer(question, Said { yes, who }) {
         return Answer::text(409, "that question is not open any more: somebody has answered it, or it was withdrawn");
     }
-    keys::told(if yes { "confirmed" } else { "not confirmed" }, &who);
     Answer::text(202, "heard")
 }
 

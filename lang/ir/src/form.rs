@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::quantity::show_number;
+use crate::quantity::{Unit, show_number};
 
 /// How a number is written on a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -99,8 +99,14 @@ pub struct Read {
     pub length: usize,
 }
 
-/// A number below this is the rounding of one that is nothing.
-const NOTHING: f64 = 1e-9;
+/// What conversions of units leave of a number that is nothing, in the unit that is sent.
+const NOTHING: f64 = 1e-11;
+
+/// By such a share of it a form may change a value.
+const ROUNDED: f64 = 0.05;
+
+/// So much may it change one that has a zero of convention, as 0 degC: in its unit.
+const SHIFTED: f64 = 0.5;
 
 /// Longest width of a decimal.
 const WIDEST: u8 = 24;
@@ -206,6 +212,19 @@ impl Form {
         line / self.scale
     }
 
+    /// A value, SI, in this form of a unit; in words why it has none, or is too far from itself there.
+    pub fn put(&self, unit: &Unit, value: f64) -> Result<String, String> {
+        let number = unit.of_si(value);
+        let text = self.write(number)?;
+        let Some(read) = self.read(&text) else { return Err("it cannot be read back".to_owned()) };
+        let most = if unit.offset == 0.0 { (ROUNDED * number.abs()).max(NOTHING) } else { SHIFTED };
+        if (read.number - number).abs() <= most * (1.0 + 1e-9) {
+            return Ok(text);
+        }
+        let is = unit.show(unit.to_si(read.number));
+        Err(format!("it would be {is} there, as its form has too few digits"))
+    }
+
     /// A number in this form; in words why it has none.
     pub fn write(&self, number: f64) -> Result<String, String> {
         if !number.is_finite() {
@@ -218,10 +237,6 @@ impl Form {
                     Some(digits) => fixed(scaled, digits),
                     None => plain(scaled),
                 };
-                let is_lost = scaled.abs() > NOTHING && text.bytes().all(|b| !(b'1'..=b'9').contains(&b));
-                if is_lost {
-                    return Err(format!("`{text}` says nothing of {}: it has too few digits", plain(scaled)));
-                }
                 let text = if plus && !text.starts_with('-') { format!("+{text}") } else { text };
                 let Some(width) = width.map(usize::from) else { return Ok(text) };
                 if text.len() > width {
@@ -557,6 +572,37 @@ mod tests {
         ] {
             assert!(form(text).write(number).is_err(), "{text} {number}");
         }
+    }
+
+    #[test]
+    fn a_value_is_not_sent_as_another_one() {
+        let (ml, degc) = (Unit::scaled("mL", 1e-6), Unit { symbol: "degC".to_owned(), factor: 1.0, offset: 273.15 });
+        let put = |text: &str, unit: &Unit, number: f64| form(text).put(unit, unit.to_si(number));
+        for (text, number) in [
+            ("06.3", 0.0005),
+            ("06.3", 1e-9),
+            ("06.3", 0.0044),
+            ("u8", 0.4),
+            ("u16 hex * 10", 0.26),
+            ("4 digits", 3e-4),
+        ] {
+            let why = put(text, &ml, number).expect_err(text);
+            assert!(why.contains("it would be"), "{text} {number}: {why}");
+        }
+        assert!(form("f32 hex").put(&ml, 1e-60).is_err(), "4 bytes have no room for so little");
+        for (text, number, sent) in [
+            ("06.3", 0.0, "00.000"),
+            ("06.3", 1e-15, "00.000"),
+            ("06.3", 0.0206, "00.021"),
+            ("06.3", 99.9994, "99.999"),
+            ("u8 hex", 10.4, "0A"),
+        ] {
+            assert_eq!(put(text, &ml, number).as_deref(), Ok(sent), "{text} {number}");
+        }
+        for (text, number, sent) in [(".0", 0.4, "0"), (".0", -0.4, "0"), ("i16 hex * 10", 0.04, "0000")] {
+            assert_eq!(put(text, &degc, number).as_deref(), Ok(sent), "{text} {number}");
+        }
+        assert!(put(".0 / 10", &degc, 43.0).is_err(), "tens of degrees say too little");
     }
 
     #[test]

@@ -53,6 +53,7 @@ pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<D
         bindings.extend(reader.device(name, value).map(|binding| (binding, name.span())));
     }
     reader.beside_each_other(&bindings);
+    reader.one_by_one(&bindings);
     let bindings = reader.with_shared(bindings);
     (bindings, reader.found)
 }
@@ -178,6 +179,27 @@ impl Reader<'_> {
         let carrier = Carrier::Line { driver, place, address: unit.map(|(unit, _)| unit) };
         let at = Span::new(self.file, at.start, at.end);
         (self.found.len() == before).then_some(Binding { instance, at, carrier, tolerances, identity })
+    }
+
+    /// Reports devices of one kind that are to be the same one.
+    fn one_by_one(&mut self, bound: &[(Binding, Range)]) {
+        let driver = |binding: &Binding| match binding.carrier {
+            Carrier::Line { driver, .. } => Some(&self.program.drivers[driver].name),
+            _ => None,
+        };
+        let mut twice = Vec::new();
+        for (later, (binding, at)) in bound.iter().enumerate() {
+            let Some(identity) = &binding.identity else { continue };
+            let same = |other: &&(Binding, Range)| {
+                other.0.identity.as_ref() == Some(identity) && driver(&other.0) == driver(binding)
+            };
+            let Some((other, _)) = bound[..later].iter().find(same) else { continue };
+            let [first, second] = [other, binding].map(|b| &self.program.scene.get(b.instance).name);
+            twice.push((at.clone(), format!("`{first}` and `{second}` cannot both be `{identity}`")));
+        }
+        for (at, headline) in twice {
+            self.wrong(at, &headline, "the same device", Some("give each its own `identity`".to_owned()));
+        }
     }
 
     /// Reports devices that are bound to one line and cannot be told apart there.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
+use matterix_ir::form::plain;
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{Driver, Pattern, Slot, Told, Transport, Until};
@@ -81,6 +82,9 @@ const QUIET: Duration = Duration::from_secs(1);
 /// Longest time in which a line that does not fall silent is listened to.
 const RESTLESS: Duration = Duration::from_secs(5);
 
+/// So often in a row a line is looked at on which something waits, before others have their turn.
+const MOST_WAITING: u32 = 256;
+
 /// How often who waits for an answer looks whether it is to end.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -118,10 +122,16 @@ pub trait Line {
     ) -> Result<bool, DeviceError>;
 
     /// The newest of what the device says by itself, SI, by its line of the driver; one that is older than the driver waits for
-    /// an answer is none, and the next is waited for as long.
+    /// an answer is none, or that came before what was done last, and the next is waited for as long.
     fn hear(&mut self, _line: usize, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
         Err(DeviceError::Lost("nothing is heard over this line".to_owned()))
     }
+
+    /// Takes in what the device has said by itself: what waits on a line is as old as nobody looked.
+    fn take_in(&mut self, _driver: &Driver, _ear: &mut dyn WireTap) {}
+
+    /// Something was done: what was heard before it says nothing of what is now.
+    fn forget_heard(&mut self) {}
 
     /// Lets go by what may still come in answer to a question that is given up, before it is put again.
     fn settle(&mut self, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<(), DeviceError> {
@@ -206,8 +216,14 @@ pub struct Link {
     asked: (String, Duration),
     /// What was asked last is to be asked once more.
     is_again: bool,
-    /// What the device said by itself, by the line of its driver: when, and the value.
-    heard: BTreeMap<usize, (Duration, f64)>,
+    /// What devices said by themselves, by the line of their driver: since when it may have been there, and the value.
+    heard: BTreeMap<(InstanceId, usize), (Duration, f64)>,
+    /// What was heard before says nothing of what is now.
+    done: Duration,
+    /// When nothing waited on the line: what comes in next came after that.
+    emptied: Duration,
+    /// Why the line is gone, where that was seen when nobody waited for anything.
+    gone: Option<String>,
     /// What answers said last that is kept, by its name.
     texts: BTreeMap<String, String>,
 }
@@ -225,7 +241,8 @@ impl Link {
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
         let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
         let (debt, asked, is_again) = (port.debt(), (String::new(), Duration::ZERO), false);
-        Ok(Link { world, port, codec, timeout, buffer, debt, asked, is_again, heard, texts })
+        let (done, emptied, gone) = (Duration::ZERO, Duration::ZERO, None);
+        Ok(Link { world, port, codec, timeout, buffer, debt, asked, is_again, heard, done, emptied, gone, texts })
     }
 
     /// Makes ready to say this. Nothing is said to a device that owes answers but the same once more.
@@ -280,15 +297,8 @@ impl Link {
 
     fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         // What is still there answers nothing that will be asked.
-        loop {
-            match self.port.receive(self.codec.silence()) {
-                Ok(late) if late.is_empty() => break,
-                Ok(late) => {
-                    ear.back(&late);
-                    self.buffer.extend(late);
-                }
-                Err(e) => return Err(DeviceError::Lost(format!("the line is gone: {e}"))),
-            }
+        while self.receive(self.codec.silence(), ear).map_err(DeviceError::Lost)? {
+            self.pick_up(driver);
         }
         self.pick_up(driver);
         // A line that the device has begun by itself goes on.
@@ -312,6 +322,7 @@ impl Link {
                     continue;
                 }
                 self.debt.heard(self.world.elapsed());
+                self.sift(driver);
                 return reply.map_err(|g| {
                     DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
                 });
@@ -339,17 +350,40 @@ impl Link {
 
     /// What comes in meanwhile; whether something did.
     fn listen(&mut self, within: Duration, ear: &mut dyn WireTap) -> Result<bool, DeviceError> {
-        let bytes = self.port.receive(within).map_err(|e| {
-            let why = format!("the line is gone: {e}");
-            if self.port.renews() { DeviceError::Silent(why) } else { DeviceError::Lost(why) }
+        let came = self.receive(within, ear).map_err(|why| match self.port.renews() {
+            true => DeviceError::Silent(why),
+            false => DeviceError::Lost(why),
         })?;
-        if !bytes.is_empty() {
-            ear.back(&bytes);
+        if came {
             self.debt.stirs(self.world.elapsed());
         }
-        let came = !bytes.is_empty();
-        self.buffer.extend(bytes);
         Ok(came)
+    }
+
+    /// Takes in what waits on the line, or the first that comes within this time; whether there was anything.
+    fn receive(&mut self, within: Duration, ear: &mut dyn WireTap) -> Result<bool, String> {
+        if let Some(why) = self.gone.take() {
+            return Err(why);
+        }
+        let bytes = self.port.receive(within).map_err(|e| format!("the line is gone: {e}"))?;
+        if bytes.is_empty() {
+            self.emptied = self.world.elapsed();
+            return Ok(false);
+        }
+        ear.back(&bytes);
+        self.buffer.extend(bytes);
+        Ok(true)
+    }
+
+    /// Takes what the device has said by itself behind an answer.
+    fn sift(&mut self, driver: &Driver) {
+        while speaks_up(driver) && !self.buffer.is_empty() {
+            let mut rest = self.buffer.clone();
+            match self.codec.take_reply(&mut rest) {
+                Some(Ok(reply)) if self.overheard(&reply, driver) => self.buffer = rest,
+                _ => return,
+            }
+        }
     }
 
     /// Whether more of what is late may come over a line that is listened to since `begun`, on which something was last heard then.
@@ -387,7 +421,7 @@ impl Link {
             if let Some(value) = self.codec.matched(&told.expects, &reply.text).and_then(|n| n.first().copied()) {
                 // What its instrument cannot show is nothing that was said.
                 if showable(told, &[value], &told.expects, told.shows).is_ok() {
-                    self.heard.insert(line, (self.world.elapsed(), value));
+                    self.heard.insert((driver.instance, line), (self.emptied, value));
                 }
                 return true;
             }
@@ -544,12 +578,11 @@ impl Line for Link {
     fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
         let begun = self.world.elapsed();
         loop {
-            while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
-                if let Ok(reply) = reply {
-                    self.overheard(&reply, driver);
-                }
-            }
-            if let Some((_, value)) = self.heard.get(&line).filter(|(when, _)| self.passed(*when) <= self.timeout) {
+            self.take_in(driver, ear);
+            if let Some((since, value)) = self.heard.get(&(driver.instance, line))
+                && *since >= self.done
+                && self.passed(*since) <= self.timeout
+            {
                 return Ok(*value);
             }
             let most = ear.patience().map_or(self.timeout, |patience| self.timeout.min(patience));
@@ -561,6 +594,27 @@ impl Line for Link {
             }
             self.listen(left.min(LOOK), ear)?;
         }
+    }
+
+    fn take_in(&mut self, driver: &Driver, ear: &mut dyn WireTap) {
+        if !hears(driver) {
+            return;
+        }
+        for _ in 0..MOST_WAITING {
+            self.pick_up(driver);
+            match self.receive(Duration::ZERO, ear) {
+                Ok(true) => self.debt.stirs(self.world.elapsed()),
+                Ok(false) => return,
+                Err(why) => {
+                    self.gone = Some(why);
+                    return;
+                }
+            }
+        }
+    }
+
+    fn forget_heard(&mut self) {
+        self.done = self.world.elapsed();
     }
 
     fn owed(&self) -> u32 {
@@ -619,10 +673,19 @@ pub(crate) fn showable(
         (true, false) => format!("{} and more", unit.show(least)),
         _ => format!("at most {}", show_number(unit.of_si(most))),
     };
-    Err(DeviceError::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, unit.show(value))))
+    let mut is = unit.show(value);
+    if range.contains(&is) {
+        is = format!("{} {}", plain(unit.of_si(value)), unit.symbol);
+    }
+    Err(DeviceError::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, is.trim())))
+}
+
+/// Whether a device says values by itself.
+fn hears(driver: &Driver) -> bool {
+    driver.told.iter().any(|told| told.heard.is_some())
 }
 
 /// Whether a device says something by itself.
 fn speaks_up(driver: &Driver) -> bool {
-    !driver.ignores.is_empty() || driver.told.iter().any(|told| told.heard.is_some())
+    !driver.ignores.is_empty() || hears(driver)
 }

@@ -131,6 +131,9 @@ impl Port for Serial {
     }
 
     fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>> {
+        if within.is_zero() && !has_come(&self.0)? {
+            return Ok(Vec::new());
+        }
         self.0.set_read_timeout(within.max(LEAST))?;
         some(|buffer| self.0.read(buffer))
     }
@@ -144,9 +147,31 @@ impl Port for Tcp {
     }
 
     fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>> {
+        if within.is_zero() && !has_come(&self.0)? {
+            return Ok(Vec::new());
+        }
         self.0.set_read_timeout(Some(within.max(LEAST)))?;
         some(|buffer| self.0.read(buffer))
     }
+}
+
+/// Whether something waits there, or the line is gone, which reading tells.
+#[cfg(unix)]
+fn has_come(line: &impl std::os::fd::AsFd) -> io::Result<bool> {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+    let now = Timespec { tv_sec: 0, tv_nsec: 0 };
+    match poll(&mut [PollFd::new(line, PollFlags::IN)], Some(&now)) {
+        Ok(ready) => Ok(ready > 0),
+        Err(rustix::io::Errno::INTR) => Ok(false),
+        Err(e) => Err(e.into()),
+    }
+}
+
+/// Only reading tells.
+#[cfg(not(unix))]
+fn has_come<T>(_: &T) -> io::Result<bool> {
+    Ok(true)
 }
 
 fn some(mut read: impl FnMut(&mut [u8]) -> io::Result<usize>) -> io::Result<Vec<u8>> {

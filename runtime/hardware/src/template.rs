@@ -13,8 +13,8 @@ pub fn filled(template: &Template, mut value: impl FnMut(NodeId) -> Option<f64>)
             Piece::Number { value: node, unit, form } => {
                 let known = value(*node).filter(|v| v.is_finite());
                 let known = known.ok_or_else(|| format!("a number of `{}` is not known", written(template)))?;
-                let sent = form.write(unit.of_si(known));
-                let sent = sent
+                let sent = form
+                    .put(unit, known)
                     .map_err(|why| format!("{} cannot be sent in `{}`: {why}", unit.show(known), written(template)))?;
                 out.push_str(&sent);
             }

@@ -10,11 +10,22 @@ use super::{Executor, tree};
 use crate::fault::Fault;
 
 impl<'p> Executor<'p, '_> {
-    /// What of it holds now, at the start. What cannot be asked for is not known to, as of a device that shows something else
-    /// before it is told anything.
-    pub(super) fn in_order(&mut self) -> Vec<&'p Limit> {
-        let plan = self.plan;
-        plan.ends.iter().filter(|end| matches!(self.holds(&end.condition), Ok(Some(true)))).collect()
+    /// What of it is to hold at the end: what holds now, at the start, and what a device tells no sense of now, as one that shows
+    /// something else before it is told anything. Fails where a device does not answer at all.
+    pub(super) fn in_order(&mut self) -> Result<Vec<&'p Limit>, Fault> {
+        let mut begun = Vec::new();
+        for end in &self.plan.ends {
+            match self.holds(&end.condition) {
+                Ok(Some(true)) => begun.push(end),
+                Ok(_) => {}
+                Err(fault) => match fault.code {
+                    codes::DEVICE_GARBLED | codes::DEVICE_REFUSED => begun.push(end),
+                    codes::NOT_A_NUMBER => {}
+                    _ => return Err(fault),
+                },
+            }
+        }
+        Ok(begun)
     }
 
     /// Judges at the end what was in order at the start; a run that failed or was stopped leaves things as they are. Fails where

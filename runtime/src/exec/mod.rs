@@ -312,7 +312,13 @@ impl<'p> Executor<'p, '_> {
             self.state.abort = Some(Abort::Fault(Box::new(FailureTrace::of_fault(self.plan, fault))));
             return false;
         }
-        self.state.begun = Some(self.in_order());
+        match self.in_order() {
+            Ok(begun) => self.state.begun = Some(begun),
+            Err(fault) => {
+                self.abort(FailureTrace::of_fault(self.plan, fault));
+                return false;
+            }
+        }
         let root = self.insert(None, None);
         self.set_kind(root, Kind::Pass);
         self.spawn(root, self.plan.root);

@@ -1,6 +1,7 @@
 //! Workflows on devices: emulators and devices that misbehave, what is sent, what is refused, what is left safe.
 
 mod ask;
+mod believed;
 mod bindings;
 mod faulty;
 mod framed;

@@ -93,7 +93,7 @@ impl Planner<'_, '_> {
     /// Reports a number that is known and does not fit its form.
     pub(super) fn fits_form(&mut self, value: NodeId, unit: &Unit, form: &Form, at: Span) -> Option<()> {
         let Some(known) = self.lab.known(value).filter(|v| v.is_finite()) else { return Some(()) };
-        match form.write(unit.of_si(known)) {
+        match form.put(unit, known) {
             Ok(_) => Some(()),
             Err(why) => {
                 let headline = format!("{} cannot be sent in this form: {why}", unit.show(known));

@@ -285,7 +285,10 @@ impl Hardware<'_, '_> {
                     self.recall(ticket);
                     let asked = self.inquire(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     match asked {
-                        Ok(true) => self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed: None })?,
+                        Ok(true) => {
+                            self.forget_heard();
+                            self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed: None })?;
+                        }
                         Ok(false) if now >= deadline => {
                             let message = format!("`{}` was not ready in time", self.devices[device].name);
                             return Err(self.fault(codes::DEVICE_LOST, exchange.span, message));

@@ -36,10 +36,27 @@ impl Answer {
 /// What is shown to whoever is at the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Notice<'t> {
-    /// A question, and whether somebody has to answer it.
-    Asked(&'t str, bool),
+    /// The question that the next answer at the terminal is to.
+    Prompt(&'t str),
+    /// A question that is asked too, and prompted for when those before it are answered.
+    Waits(&'t str),
+    /// A question that is answered at once, as all are.
+    Answered(&'t str),
+    /// What was said to a question, and by whom.
+    Heard(&'t str, &'t Answer),
     /// A question that is asked no longer.
     Withdrawn(&'t str),
+}
+
+/// What became of an answer at the terminal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taken {
+    /// It is the answer to the question that was prompted for.
+    Yes,
+    /// It is none: the question that was prompted for before was withdrawn, or answered elsewhere, and it may be meant for that.
+    Overtaken,
+    /// Nothing is asked.
+    Nothing,
 }
 
 /// What people say while a deployment goes on: from a keyboard, by signals, over a page. It is shared between threads.
@@ -57,8 +74,10 @@ struct Said {
     /// Questions that are open, by number.
     open: BTreeMap<u64, String>,
     answers: BTreeMap<u64, Answer>,
-    /// A question was withdrawn since somebody last answered: what they type next may be meant for that.
-    withdrawn: bool,
+    /// The question that the next answer at the terminal is to.
+    prompted: Option<u64>,
+    /// One that was prompted for is over without an answer there: what is typed next may be meant for that.
+    overtaken: bool,
     /// Answers that were ever given.
     given: usize,
     /// Answers every question at once.
@@ -72,6 +91,18 @@ impl Said {
         self.answers.insert(question, answer);
         self.given += 1;
     }
+
+    /// A question is over: the next one is prompted for.
+    fn close(&mut self, question: u64, show: fn(Notice<'_>)) {
+        if self.prompted != Some(question) {
+            return;
+        }
+        let next = self.open.first_key_value();
+        self.prompted = next.map(|(number, _)| *number);
+        if let Some((_, text)) = next {
+            show(Notice::Prompt(text));
+        }
+    }
 }
 
 impl Control {
@@ -81,7 +112,8 @@ impl Control {
         let said = Said {
             open: BTreeMap::new(),
             answers: BTreeMap::new(),
-            withdrawn: false,
+            prompted: None,
+            overtaken: false,
             given: 0,
             standing: None,
             gates: VecDeque::new(),
@@ -102,17 +134,21 @@ impl Control {
         for question in std::mem::take(&mut said.open).into_keys() {
             said.give(question, answer.clone());
         }
+        said.prompted = None;
         said.standing = Some(answer);
     }
 
     /// A question is put.
     pub fn ask(&self, question: u64, text: &str) {
         let mut said = self.said();
-        (self.show)(Notice::Asked(text, said.standing.is_none()));
-        match said.standing.clone() {
-            Some(answer) => said.give(question, answer),
-            None => drop(said.open.insert(question, text.to_owned())),
+        if let Some(answer) = said.standing.clone() {
+            (self.show)(Notice::Answered(text));
+            said.give(question, answer);
+            return;
         }
+        said.open.insert(question, text.to_owned());
+        let prompted = *said.prompted.get_or_insert(question);
+        (self.show)(if prompted == question { Notice::Prompt(text) } else { Notice::Waits(text) });
     }
 
     /// The questions that are open, by number.
@@ -120,14 +156,41 @@ impl Control {
         self.said().open.iter().map(|(number, text)| (*number, text.clone())).collect()
     }
 
-    /// A person answers; false where that question is not open.
+    /// A person who is not at the terminal answers; false where that question is not open.
     pub fn answer(&self, question: u64, answer: Answer) -> bool {
         let mut said = self.said();
-        let is_open = said.open.remove(&question).is_some();
-        if is_open {
-            said.give(question, answer);
+        let Some(text) = said.open.remove(&question) else { return false };
+        (self.show)(Notice::Heard(&text, &answer));
+        said.overtaken |= said.prompted == Some(question);
+        said.give(question, answer);
+        said.close(question, self.show);
+        true
+    }
+
+    /// A person at the terminal answers what is prompted for.
+    pub fn answer_prompted(&self, answer: Answer) -> Taken {
+        let mut said = self.said();
+        let is_overtaken = std::mem::take(&mut said.overtaken);
+        let Some(question) = said.prompted else {
+            return if is_overtaken { Taken::Overtaken } else { Taken::Nothing };
+        };
+        if is_overtaken {
+            return Taken::Overtaken;
         }
-        is_open
+        if let Some(text) = said.open.remove(&question) {
+            (self.show)(Notice::Heard(&text, &answer));
+        }
+        said.give(question, answer);
+        said.close(question, self.show);
+        Taken::Yes
+    }
+
+    /// Shows once more what is prompted for.
+    pub fn prompt_again(&self) {
+        let said = self.said();
+        if let Some(text) = said.prompted.and_then(|question| said.open.get(&question)) {
+            (self.show)(Notice::Prompt(text));
+        }
     }
 
     /// What was answered, once.
@@ -144,15 +207,11 @@ impl Control {
     pub fn withdraw(&self, question: u64) {
         let mut said = self.said();
         if let Some(text) = said.open.remove(&question) {
-            said.withdrawn = true;
+            said.overtaken |= said.prompted == Some(question);
             (self.show)(Notice::Withdrawn(&text));
+            said.close(question, self.show);
         }
         said.answers.remove(&question);
-    }
-
-    /// Whether a question was withdrawn since this was last asked: an answer without a name may be meant for that one.
-    pub fn is_overtaken(&self) -> bool {
-        std::mem::take(&mut self.said().withdrawn)
     }
 
     /// A person says what may begin.

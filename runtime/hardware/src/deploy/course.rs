@@ -234,7 +234,7 @@ fn concluded(
     let mut found = findings(&execution);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
     found.extend(hardware.unhalted().iter().cloned().map(not_halted));
-    if !well || !hardware.unhalted().is_empty() {
+    if !well || !execution.unfinished.is_empty() || !hardware.unhalted().is_empty() {
         if hardware.journal().broken.is_some() {
             hardware.journal().shut();
         }

@@ -74,6 +74,8 @@ pub struct Device<'m> {
     pub link: Option<Box<dyn Line>>,
     /// Frames for a dry run.
     pub codec: Option<Codec>,
+    /// It has said over the line that is open that it is the one that is meant, or its driver does not ask.
+    pub known: bool,
     /// Something was said over its line.
     pub said: bool,
     /// Something was said to it.
@@ -111,9 +113,9 @@ impl<'m> Device<'m> {
         };
         let name = &program.scene.get(binding.instance).name;
         let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
-        let (said, told, lost, renewed) = (false, false, None, false);
+        let (known, said, told, lost, renewed) = (false, false, false, None, false);
         let (link, owed, undone) = (None, 0, Vec::new());
-        Ok(Device { name, binding, driver, host, link, codec, said, told, lost, owed, undone, renewed, beats })
+        Ok(Device { name, binding, driver, host, link, codec, known, said, told, lost, owed, undone, renewed, beats })
     }
 }
 

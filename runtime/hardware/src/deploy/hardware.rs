@@ -295,9 +295,9 @@ impl<'m, 't> Hardware<'m, 't> {
             DeviceError::Mistaken(_) => codes::OTHER_DEVICE,
             DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
         };
-        if matches!(trouble, DeviceError::Lost(_) | DeviceError::Silent(_)) {
+        if matches!(trouble, DeviceError::Lost(_) | DeviceError::Silent(_) | DeviceError::Mistaken(_)) {
             let line = self.line_of(device);
-            self.devices[line].lost = Some(trouble.text().to_owned());
+            self.devices[line].lost.get_or_insert_with(|| trouble.text().to_owned());
             self.losing = Some(self.devices[line].name.to_owned());
             if let Some(link) = self.devices[line].link.take() {
                 self.devices[line].owed += link.owed();

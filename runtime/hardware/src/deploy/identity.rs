@@ -28,15 +28,33 @@ impl Hardware<'_, '_> {
     /// Asks all devices who they are; the first that is another one or does not say, with where it is bound.
     pub(super) fn identify(&mut self) -> Result<(), (usize, DeviceError, Span)> {
         for device in 0..self.devices.len() {
-            let Some(driver) = self.devices[device].driver else { continue };
-            let mut said = Vec::new();
-            for identity in &driver.identity {
-                let at = identity.exchange.span;
-                said.extend(self.who_is(device, identity).map_err(|trouble| (device, trouble, at))?);
-            }
-            self.judge(device, &said).map_err(|trouble| (device, trouble, driver.span))?;
+            self.same(device)?;
         }
         Ok(())
+    }
+
+    /// Asks a device who it is, unless it has said so over the line that is open: whoever opens a line anew may find another device
+    /// behind it.
+    pub(super) fn same(&mut self, device: usize) -> Result<(), (usize, DeviceError, Span)> {
+        let Some(driver) = self.devices[device].driver.filter(|_| !self.devices[device].known) else { return Ok(()) };
+        let mut said = Vec::new();
+        for identity in &driver.identity {
+            let at = identity.exchange.span;
+            said.extend(self.who_is(device, identity).map_err(|trouble| (device, trouble, at))?);
+        }
+        self.judge(device, &said).map_err(|trouble| (device, trouble, driver.span))?;
+        let name = self.devices[device].name;
+        for (word, text) in said {
+            self.said_first.entry((name.to_owned(), word)).or_insert(text);
+        }
+        self.devices[device].known = true;
+        Ok(())
+    }
+
+    /// The same of all devices behind a line.
+    pub(super) fn same_behind(&mut self, line: usize) -> Result<(), (usize, DeviceError, Span)> {
+        let behind = (0..self.devices.len()).filter(|device| self.line_of(*device) == line);
+        behind.collect::<Vec<_>>().into_iter().try_for_each(|device| self.same(device))
     }
 
     /// What a device answers to one question who it is: words and texts.
@@ -66,9 +84,9 @@ impl Hardware<'_, '_> {
         let before = |word: &String| self.said_first.get(&(of.name.to_owned(), word.clone())).map(String::as_str);
         let earlier: Option<Vec<&str>> = said.iter().map(|(word, _)| before(word)).collect();
         match earlier.map(|texts| joined(texts.into_iter())) {
-            Some(was) if was != is => Err(DeviceError::Mistaken(format!(
-                "it says that it is `{is}`, and `{was}` was there when the journal was left"
-            ))),
+            Some(was) if was != is => {
+                Err(DeviceError::Mistaken(format!("it says that it is `{is}`, and `{was}` was there before")))
+            }
             _ => Ok(()),
         }
     }

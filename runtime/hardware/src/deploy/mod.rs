@@ -17,6 +17,7 @@ mod observe;
 mod pace;
 mod people;
 mod preflight;
+mod proof;
 mod replay;
 mod resume;
 mod safe;
@@ -25,7 +26,7 @@ mod speak;
 mod unbound;
 mod values;
 
-pub use control::{Answer, Control, Notice};
+pub use control::{Answer, Control, Notice, Taken};
 pub use course::{Course, Ending, Kept, REFUSED, carry_out, not_opened, not_reached, of_fault, unsafe_left};
 pub use device::{Binding, Carrier, Device};
 pub use exposed::Exposed;

@@ -57,6 +57,7 @@ impl Hardware<'_, '_> {
             }
             if is_live && !self.is_dry() && target > self.clock() {
                 self.look_between()?;
+                self.take_in();
                 let left = Duration::try_from_secs_f64((target - self.clock()) / self.settings.speed);
                 self.settings.world.sleep(left.unwrap_or(NAP).clamp(LEAST, NAP));
                 continue;

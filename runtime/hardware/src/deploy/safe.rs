@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use matterix_ir::Span;
 use matterix_ir::plan::Step;
-use matterix_ir::wire::{Driver, Exchange, Framing, Template, Until};
+use matterix_ir::wire::{Driver, Exchange, Template, Until};
 
 use matterix_runtime::backend::Backend;
 
@@ -21,7 +21,7 @@ const SECURED: Duration = Duration::from_secs(30);
 const MOST_OWED: u32 = 5;
 
 /// How often it is asked.
-const POLL: Duration = Duration::from_millis(200);
+pub(super) const POLL: Duration = Duration::from_millis(200);
 
 impl Hardware<'_, '_> {
     /// Nothing is gone on with: devices may be as an earlier process has left them. Whether there are any behind lines.
@@ -174,7 +174,7 @@ impl Hardware<'_, '_> {
             return Err(named(why, name));
         }
         self.relink(line);
-        let mut done = self.say_safe(index, driver);
+        let mut done = self.made_safe_if_same(index, driver);
         if let Err(DeviceError::Lost(_) | DeviceError::Silent(_) | DeviceError::Garbled(_)) = done
             && self.devices[line].lost.is_none()
         {
@@ -184,7 +184,7 @@ impl Hardware<'_, '_> {
                 self.devices[line].owed += link.map_or(0, |link| link.owed());
                 self.relink(line);
             }
-            done = self.say_safe(index, driver);
+            done = self.made_safe_if_same(index, driver);
         }
         let (t, device) = (self.twin.now(), name.to_owned());
         if done != Ok(false) {
@@ -220,10 +220,20 @@ impl Hardware<'_, '_> {
             !self.speaks(),
         ) {
             match self.linked(line, driver, &place, address.as_deref()) {
-                Ok(link) => (self.devices[line].link, self.devices[line].lost) = (Some(link), None),
+                Ok(link) => self.put_through(line, link),
                 Err(trouble) => self.devices[line].lost = Some(trouble.text().to_owned()),
             }
         }
+    }
+
+    /// Says what makes a device safe, unless another one is behind its line by now.
+    fn made_safe_if_same(&mut self, index: usize, driver: &Driver) -> Result<bool, DeviceError> {
+        let line = self.line_of(index);
+        if let (None, Some(why)) = (&self.devices[line].link, &self.devices[line].lost) {
+            return Err(DeviceError::Lost(why.clone()));
+        }
+        self.same(index).map_err(|(_, trouble, _)| trouble)?;
+        self.say_safe(index, driver)
     }
 
     /// Says what makes a device safe; whether there was something to say to it.
@@ -241,10 +251,14 @@ impl Hardware<'_, '_> {
                 self.say_one(index, exchange, &texts)?;
             }
         }
-        if said && !heard && self.speaks() {
-            for _ in 0..self.attempts(index) {
-                self.prove(index, driver)?;
+        if said && self.speaks() {
+            self.forget_heard();
+            if !heard {
+                for _ in 0..self.attempts(index) {
+                    self.prove(index, driver)?;
+                }
             }
+            self.has_ended(index)?;
         }
         Ok(said)
     }
@@ -263,7 +277,7 @@ impl Hardware<'_, '_> {
     }
 
     /// Messages with the values that they have now.
-    fn sayable(&mut self, sends: &[Template]) -> Result<Vec<String>, DeviceError> {
+    pub(super) fn sayable(&mut self, sends: &[Template]) -> Result<Vec<String>, DeviceError> {
         self.texts(sends).map_err(|fault| DeviceError::Unsaid(fault.message))
     }
 
@@ -294,33 +308,6 @@ impl Hardware<'_, '_> {
                 return Err(DeviceError::Silent(format!("it did not tell within {seconds} s that it was safe")));
             }
             self.settings.world.sleep(POLL);
-        }
-    }
-
-    /// Nothing answered what makes the device safe: it is asked for anything that it tells, to know that it hears.
-    fn prove(&mut self, index: usize, driver: &Driver) -> Result<(), DeviceError> {
-        if driver.framing == Framing::Calls
-            || self.devices[index].codec.as_ref().is_some_and(|codec| codec.acknowledges())
-        {
-            return Ok(());
-        }
-        let applies = driver.told.iter().find(|told| match told.condition {
-            Some(condition) => self.twin.engine().eval(condition) != 0.0,
-            None => true,
-        });
-        let Some(told) = applies else {
-            let why = "nothing that it answers says that it heard what makes it safe".to_owned();
-            return Err(DeviceError::Silent(why));
-        };
-        let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
-        let line = driver.told.iter().position(|t| std::ptr::eq(t, told)).unwrap_or_default();
-        let asked = self.over(index, |link, driver, ear| match told.heard {
-            Some(_) => link.hear(line, driver, ear),
-            None => link.ask(&text, told, driver, ear),
-        });
-        match asked {
-            Ok(_) | Err(DeviceError::Refused { .. }) => Ok(()),
-            Err(other) => Err(other),
         }
     }
 }

@@ -22,7 +22,7 @@ impl Hardware<'_, '_> {
             let Some(driver) = self.devices[index].driver.filter(|_| self.speaks()) else { continue };
             let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() else { continue };
             match self.linked(index, driver, &place, address.as_deref()) {
-                Ok(link) => self.devices[index].link = Some(link),
+                Ok(link) => self.put_through(index, link),
                 Err(trouble) => unreached.push(self.not_reached(index, trouble)),
             }
         }
@@ -100,8 +100,18 @@ impl Hardware<'_, '_> {
         }
         let Some(driver) = device.driver.filter(|_| place.keeps_answers_apart()) else { return };
         self.devices[line].renewed = true;
-        if let Ok(link) = self.linked(line, driver, &place, address.as_deref()) {
-            (self.devices[line].link, self.devices[line].lost) = (Some(link), None);
+        let Ok(link) = self.linked(line, driver, &place, address.as_deref()) else { return };
+        self.put_through(line, link);
+        if let Err((device, trouble, at)) = self.same_behind(line) {
+            self.trouble(device, &trouble, at);
+        }
+    }
+
+    /// A line is open from here on; who is behind it has not said so yet.
+    pub(super) fn put_through(&mut self, line: usize, link: Box<dyn Line>) {
+        (self.devices[line].link, self.devices[line].lost) = (Some(link), None);
+        for device in 0..self.devices.len() {
+            self.devices[device].known &= self.line_of(device) != line;
         }
     }
 

@@ -166,6 +166,26 @@ impl<'m> Hardware<'m, '_> {
         done
     }
 
+    /// Takes in what devices say by themselves; it is in the journal where it is asked for.
+    pub(super) fn take_in(&mut self) {
+        for index in 0..self.devices.len() {
+            let speaks_up = self.devices[index].driver.is_some_and(|d| d.told.iter().any(|told| told.heard.is_some()));
+            if !speaks_up || self.devices[self.line_of(index)].link.is_none() {
+                continue;
+            }
+            // A line that is gone says so to who asks next.
+            let _ = self.over_line(index, Some(Vec::new()), |link, driver, ear| {
+                link.take_in(driver, ear);
+                Ok(())
+            });
+        }
+    }
+
+    /// Something was done: what devices said before it says nothing of what is now.
+    pub(super) fn forget_heard(&mut self) {
+        self.devices.iter_mut().filter_map(|device| device.link.as_mut()).for_each(|link| link.forget_heard());
+    }
+
     /// Asks a device for a quantity, SI.
     pub(super) fn tell(&mut self, index: usize, line: usize) -> Result<f64, Fault> {
         let Some(told) = self.devices[index].driver.and_then(|d| d.told.get(line)) else { return Ok(f64::NAN) };
@@ -228,6 +248,7 @@ impl<'m> Hardware<'m, '_> {
         self.keep(&starting)?;
         match self.try_say(device, &texts, exchange.expects.as_ref()) {
             Ok(_) => {
+                self.forget_heard();
                 self.keep(&Entry::Started { t, ticket })?;
                 Ok(None)
             }

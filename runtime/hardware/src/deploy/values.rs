@@ -58,10 +58,15 @@ impl Hardware<'_, '_> {
             let value = self.told(told, out)?;
             values.insert(told, value);
         }
-        let graph = &self.program.model.graph;
         if values.is_empty() {
             return Ok(self.twin.value(node, out)?.unwrap_or(f64::NAN));
         }
+        Ok(self.with_told(node, values))
+    }
+
+    /// The value of a node with these in place of what the twin supposes.
+    pub(super) fn with_told(&mut self, node: NodeId, mut values: BTreeMap<NodeId, f64>) -> f64 {
+        let graph = &self.program.model.graph;
         let engine = self.twin.engine();
         for n in graph.schedule([node]) {
             if values.contains_key(&n) {
@@ -76,6 +81,6 @@ impl Hardware<'_, '_> {
             };
             values.insert(n, value);
         }
-        Ok(values.get(&node).copied().unwrap_or(f64::NAN))
+        values.get(&node).copied().unwrap_or(f64::NAN)
     }
 }

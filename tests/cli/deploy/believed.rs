@@ -1,0 +1,242 @@
+//! What a device is believed: that it stopped, that it is the same one, that what it says by itself is of now, that it is there at all.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use super::{Answer, Device, bench, deploy_at};
+use crate::harness::{Ended, write};
+
+/// A pump and a plate that tell what they do; each says who it is.
+const LAB: &str = "mtx 1
+capability Doser: Body {
+    state going: Bool = false
+    command run
+        effect going = true
+    command rest
+        effect going = false
+    ends not going else left_pumping \"stop it\"
+}
+asset MyDoser: Doser { mass: 2 kg }
+driver DoserLine for MyDoser over tcp(framing: cr, timeout: 300 ms) {
+    identity sends \"ID?\" expects \"ID {<serial>}\"
+    run sends \"R\" expects \"OK\"
+    rest sends \"H\" expects \"OK\"
+    reading going asks \"G?\" expects \"G {0 = false | 1 = true}\"
+    reply \"ERR {_}\" fails refused
+    safe sends \"H\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, pump = MyDoser at (1, 0, 0) m, other = MyDoser at (2, 0, 0) m }
+workflow go in bench { run pump; wait 500 ms; rest pump }
+workflow breaks in bench { run pump; wait 200 ms; expect pump.going; rest pump; run other; run other; rest other }
+";
+
+fn flat(ended: &Ended) -> String {
+    ended.err.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Runs a workflow of the lab on a pump and another one.
+fn goes(dir: &Path, workflow: &str, pump: &str, other: &str, more: &str) -> Ended {
+    write(dir, "lab.toml", format!("[pump]\naddress = \"{pump}\"\n{more}[other]\naddress = \"{other}\"\n"));
+    deploy_at("1", dir, &["--mode", "real", "--workflow", workflow])
+}
+
+/// A pump that does what it is told, but for what `hook` answers.
+fn doser(serial: &'static str, hook: impl Fn(&str, usize) -> Option<Answer> + Send + 'static) -> Device {
+    let going = Mutex::new(false);
+    Device::start(b'\r', move |line, before| {
+        let mut going = going.lock().expect("not poisoned");
+        if let Some(answer) = hook(line, before) {
+            return answer;
+        }
+        match line {
+            "ID?" => Answer::Says(serial),
+            "G?" => Answer::Says(if *going { "G 1\r" } else { "G 0\r" }),
+            "R" | "H" => {
+                *going = line == "R";
+                Answer::Says("OK\r")
+            }
+            _ => Answer::Says("ERR 2\r"),
+        }
+    })
+}
+
+#[test]
+fn a_device_that_goes_on_after_it_took_safe_is_named() {
+    // It says that it stops and does not, as under local control; the other one ends the run.
+    let pump = doser("ID A\r", |line, _| (line == "H").then_some(Answer::Says("OK\r")));
+    let other = doser("ID B\r", |line, _| (line == "R").then_some(Answer::HangsUp));
+    let dir = bench("believed_safe", LAB, "pump", "");
+    let text = LAB.replace("expect pump.going; rest pump; ", "");
+    write(&dir, "lab.mtx", text);
+    let ended = goes(&dir, "breaks", &pump.address, &other.address, "");
+    let said = flat(&ended);
+    assert_eq!(ended.code, 1, "{said}");
+    let wanted =
+        "could not be made safe: `pump`: it took what makes it safe, and still is left pumping by what it tells";
+    assert!(said.contains(wanted), "{said}");
+}
+
+#[test]
+fn a_device_that_is_on_at_the_end_is_made_safe() {
+    // Somebody starts it again at its panel after the plan has stopped it.
+    let asked = Mutex::new(0);
+    let pump = doser("ID A\r", move |line, _| {
+        let mut asked = asked.lock().expect("not poisoned");
+        *asked += usize::from(line == "H");
+        (line == "G?" && *asked == 1).then_some(Answer::Says("G 1\r"))
+    });
+    let other = doser("ID B\r", |_, _| None);
+    let dir =
+        bench("believed_end", &LAB.replace("reading going asks", "reading going while not going asks"), "pump", "");
+    let ended = goes(&dir, "go", &pump.address, &other.address, "");
+    let said = flat(&ended);
+    assert!(ended.code == 1, "{said}");
+    assert_eq!(pump.heard().iter().filter(|line| *line == "H").count(), 2, "{:?} {said}", pump.heard());
+}
+
+#[test]
+fn a_device_that_answers_nothing_at_the_start_ends_the_run() {
+    let pump = doser("ID A\r", |_, _| None);
+    for (answer, code) in
+        [(None, "device-lost"), (Some("G 7\r"), "device-garbled"), (Some("ERR 9\r"), "device-refused")]
+    {
+        // What it shows makes no sense from beginning to end: nobody knows at the end whether it is off.
+        let other =
+            doser("ID B\r", move |line, _| (line == "G?").then(|| answer.map_or(Answer::Nothing, Answer::Says)));
+        let dir = bench(&format!("believed_{code}"), LAB, "pump", "");
+        let ended = goes(&dir, "go", &pump.address, &other.address, "");
+        assert_eq!(ended.code, 1, "{}", ended.err);
+        assert!(ended.err.contains(&format!("error[{code}]: `other`")), "{code}: {}", ended.err);
+    }
+}
+
+/// A line whose devices change places when one of them has been told to begin: whoever connects again meets the other.
+fn exchanged() -> (String, Arc<Mutex<Vec<(&'static str, String)>>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let heard = Arc::new(Mutex::new(Vec::new()));
+    let told = Arc::clone(&heard);
+    std::thread::spawn(move || {
+        for (turn, stream) in listener.incoming().flatten().enumerate() {
+            let serial = if turn == 0 { "A" } else { "B" };
+            meet(stream, serial, &told);
+        }
+    });
+    (address, heard)
+}
+
+fn meet(stream: TcpStream, serial: &'static str, heard: &Mutex<Vec<(&'static str, String)>>) {
+    let mut out = stream.try_clone().expect("a stream");
+    let mut going = false;
+    for line in BufReader::new(stream).split(b'\r').map_while(Result::ok) {
+        let line = String::from_utf8_lossy(&line).into_owned();
+        heard.lock().expect("not poisoned").push((serial, line.clone()));
+        let answer = match line.as_str() {
+            "ID?" => format!("ID {serial}\r"),
+            "G?" => format!("G {}\r", u8::from(going)),
+            // The hub resets while the pump goes.
+            "H" if serial == "A" => {
+                let _ = out.shutdown(Shutdown::Both);
+                return;
+            }
+            _ => {
+                going = line == "R";
+                "OK\r".to_owned()
+            }
+        };
+        if out.write_all(answer.as_bytes()).is_err() {
+            return;
+        }
+    }
+}
+
+#[test]
+fn another_device_behind_the_line_is_not_made_safe_in_place_of_the_one_that_goes_on() {
+    for bound in ["identity = \"A\"\n", ""] {
+        let (address, heard) = exchanged();
+        let other = doser("ID C\r", |_, _| None);
+        let dir = bench(&format!("believed_same_{}", bound.len()), LAB, "pump", "");
+        let ended = goes(&dir, "go", &address, &other.address, bound);
+        let said = flat(&ended);
+        assert_eq!(ended.code, 1, "{said}");
+        assert!(said.contains("could not be made safe: `pump`: it says that it is `B`, and `A`"), "{said}");
+        let heard = heard.lock().expect("not poisoned");
+        let to_other: Vec<&str> = heard.iter().filter(|(of, _)| *of == "B").map(|(_, line)| line.as_str()).collect();
+        assert!(!to_other.is_empty() && to_other.iter().all(|line| *line == "ID?"), "{to_other:?}");
+    }
+}
+
+#[test]
+fn two_bindings_are_not_the_same_device() {
+    let dir = bench("believed_twice", LAB, "pump", "");
+    let one = "identity = \"A\"\n";
+    write(
+        &dir,
+        "lab.toml",
+        format!("[pump]\naddress = \"localhost:1\"\n{one}[other]\naddress = \"localhost:2\"\n{one}"),
+    );
+    let ended = deploy_at("1", &dir, &["--workflow", "go"]);
+    assert!(ended.code == 1 && ended.err.contains("`other` and `pump` cannot both be `A`"), "{}", ended.err);
+}
+
+/// A balance that tells its weight by itself.
+const STREAM: &str = "mtx 1
+capability Streamer: Body {
+    state zeroed: Bool = false
+    param supposed: Mass = 10 g
+    reading net: Mass = supposed
+    command zero
+        effect zeroed = true
+}
+asset My: Streamer { mass: 1 kg }
+driver MyLine for My over tcp(framing: cr, timeout: 2 s) {
+    zero sends \"T\" expects \"OK\"
+    reading net hears \"N {g in -1 .. 2000}\" every 200 ms
+}
+lab bench { ambient: 22 degC, v = My at (0, 0, 0) m }
+workflow waits in bench {
+    let a = v.net
+    wait 4 s
+    let b = v.net
+    note \"weighed {b - a as g :.3} g\"
+}
+workflow zeroes in bench { let a = v.net; wait 300 ms; zero v; let b = v.net; note \"weighed {b as g :.3} g\" }
+";
+
+/// It tells how long it has been there, in s as g, so often; `T` sets it to 0.
+fn streamer(every: Duration) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let since = Arc::new(Mutex::new(std::time::Instant::now() - Duration::from_secs(20)));
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let (mut out, mut answers) = (stream.try_clone().expect("a stream"), stream.try_clone().expect("a stream"));
+            let begun = Arc::clone(&since);
+            std::thread::spawn(move || {
+                let passed = || begun.lock().expect("not poisoned").elapsed().as_secs_f64();
+                while out.write_all(format!("N {:.3}\r", passed()).as_bytes()).is_ok() {
+                    std::thread::sleep(every);
+                }
+            });
+            for _ in BufReader::new(stream).split(b'\r').map_while(Result::ok) {
+                *since.lock().expect("not poisoned") = std::time::Instant::now();
+                let _ = answers.write_all(b"OK\r");
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn what_a_device_says_by_itself_is_of_now() {
+    for (workflow, every, passed) in [("waits", 5, 3.7..4.3), ("waits", 200, 3.7..4.3), ("zeroes", 200, 0.0..0.5)] {
+        let dir = bench(&format!("believed_{workflow}_{every}"), STREAM, "v", &streamer(Duration::from_millis(every)));
+        let ended = deploy_at("1", &dir, &["--mode", "real", "--workflow", workflow]);
+        let said = ended.err.split("weighed ").nth(1).and_then(|rest| rest.split(' ').next());
+        let told: f64 = said.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{}{}", ended.out, ended.err));
+        assert!(passed.contains(&told), "{workflow} every {every} ms: {}{}", ended.out, ended.err);
+    }
+}
