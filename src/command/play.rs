@@ -7,7 +7,7 @@ use matterix_hardware::deploy::{Carrier, unsafe_left};
 use matterix_hardware::link::{DeviceError, WireTap};
 use matterix_hardware::play::{Sheet, Unplayed, play as played};
 use matterix_hardware::{binding, calibration};
-use matterix_ir::{Diagnostic, codes};
+use matterix_ir::Diagnostic;
 
 use super::bill::show;
 use crate::args::Color;
@@ -67,7 +67,7 @@ pub fn play(
     let on_it = on_it.map(|d| format!("`{}`: `{device}` ran the file by itself", program.scene.get(d.instance).name));
     let left = broken.left.map(|why| format!("`{device}`: {why}")).into_iter().chain(on_it);
     let left: Vec<Diagnostic> = left.map(|why| unsafe_left((*at, why))).collect();
-    let code = match broken.why {
+    let trouble = match broken.why {
         Unplayed::Stopped => {
             show(&sources, left, color);
             print(Stream::Err, "it was stopped\n");
@@ -75,14 +75,11 @@ pub fn play(
         }
         Unplayed::DeviceError(trouble) => trouble,
     };
-    let (headline, code) = match &code {
-        DeviceError::Lost(why) | DeviceError::Silent(why) => (why.clone(), codes::DEVICE_LOST),
-        DeviceError::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
-        DeviceError::Unsaid(why) => (why.clone(), codes::UNSENDABLE),
-        DeviceError::Mistaken(why) => (why.clone(), codes::OTHER_DEVICE),
-        DeviceError::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
+    let why = match &trouble {
+        DeviceError::Refused { failure, text } => format!("{failure}: {text}"),
+        other => other.text().to_owned(),
     };
-    let d = Diagnostic::error(code, *at, format!("`{device}`: {headline}"), "not run to its end");
+    let d = Diagnostic::error(trouble.code(), *at, format!("`{device}`: {why}"), "not run to its end");
     show(&sources, std::iter::once(d).chain(left).collect(), color);
     Ok(Exit::Findings)
 }

@@ -8,6 +8,7 @@ use matterix_ir::form::plain;
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{Driver, Pattern, Slot, Told, Transport, Until};
+use matterix_ir::{Code, codes};
 
 use crate::codec::{Codec, Kept, Reply, shown};
 use crate::debt::Debt;
@@ -39,6 +40,17 @@ pub enum DeviceError {
 }
 
 impl DeviceError {
+    /// The code of a finding about it.
+    pub fn code(&self) -> Code {
+        match self {
+            DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
+            DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
+            DeviceError::Unsaid(_) => codes::UNSENDABLE,
+            DeviceError::Mistaken(_) => codes::OTHER_DEVICE,
+            DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
+        }
+    }
+
     /// In words.
     pub fn text(&self) -> &str {
         match self {

@@ -338,13 +338,6 @@ pub fn of_fault(plan: &Plan, fault: Fault) -> Diagnostic {
 /// A device that was not there before anything was said to any: nothing need be made safe, and a journal stays as it is.
 pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let Unreached { device, at, trouble } = unreached;
-    let code = match trouble {
-        DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
-        DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
-        DeviceError::Unsaid(_) => codes::UNSENDABLE,
-        DeviceError::Mistaken(_) => codes::OTHER_DEVICE,
-        DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
-    };
     let what = match trouble {
         DeviceError::Lost(_) | DeviceError::Silent(_) => "cannot be reached",
         DeviceError::Unsaid(_) => "cannot be spoken to",
@@ -352,7 +345,7 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
         DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is not what it is bound as",
     };
     let headline = format!("`{device}` {what}: {}", trouble.text());
-    let d = Diagnostic::error(code, *at, headline, "bound here");
+    let d = Diagnostic::error(trouble.code(), *at, headline, "bound here");
     d.help(if goes_on {
         "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"
     } else {

@@ -288,13 +288,6 @@ impl<'m, 't> Hardware<'m, 't> {
 
     /// A trouble as the fault of a device.
     pub(super) fn trouble(&mut self, device: usize, trouble: &DeviceError, span: Span) -> Fault {
-        let code = match trouble {
-            DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
-            DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
-            DeviceError::Unsaid(_) => codes::UNSENDABLE,
-            DeviceError::Mistaken(_) => codes::OTHER_DEVICE,
-            DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
-        };
         if matches!(trouble, DeviceError::Lost(_) | DeviceError::Silent(_) | DeviceError::Mistaken(_)) {
             let line = self.line_of(device);
             self.devices[line].lost.get_or_insert_with(|| trouble.text().to_owned());
@@ -306,7 +299,7 @@ impl<'m, 't> Hardware<'m, 't> {
             }
         }
         let message = format!("`{}`: {}", self.devices[device].name, trouble.text());
-        self.fault(code, span, message)
+        self.fault(trouble.code(), span, message)
     }
 
     pub(super) fn keep(&mut self, entry: &Entry) -> Result<(), Fault> {
