@@ -82,8 +82,27 @@ pub enum Command {
     Mcp(McpArgs),
     /// Create a small project that checks, runs and passes.
     New(NewArgs),
-    /// Print the versions of the command and the language.
+    /// Print what completes commands and options in a shell.
+    Completions(CompletionsArgs),
+    /// Write pages for `man`: one for the command and one for each subcommand.
+    Man(ManArgs),
+    /// Print the versions of the command and the language, and the commit that it was built from.
     Version,
+}
+
+/// `matterixc completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// For which shell.
+    pub shell: clap_complete::Shell,
+}
+
+/// `matterixc man`.
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// The folder that they go to; it is made where it is not there.
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
 }
 
 /// `matterixc check`.

@@ -10,6 +10,7 @@ mod cache;
 mod cancel;
 mod command;
 mod files;
+mod help;
 #[cfg(feature = "sila")]
 mod identity;
 mod keys;
@@ -25,8 +26,6 @@ mod terminal;
 mod uri;
 
 use std::process::ExitCode;
-
-use clap::Parser;
 
 use args::{Cli, Command};
 use terminal::{Stream, print};
@@ -53,7 +52,7 @@ impl From<Exit> for ExitCode {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match help::parse() {
         Ok(cli) => cli,
         Err(message) => {
             let is_wrong = message.use_stderr();
@@ -105,6 +104,8 @@ fn dispatch(cli: Cli) -> Exit {
         Command::Explain(args) => command::explain(&args),
         Command::Mcp(args) => command::mcp(&args),
         Command::New(args) => command::new(&args),
+        Command::Completions(args) => command::completions(&args),
+        Command::Man(args) => command::man(&args),
         Command::Version => command::version(),
     }
 }

@@ -20,6 +20,7 @@ mod play;
 mod run;
 #[cfg(feature = "sila")]
 mod serve;
+mod shell;
 mod study;
 mod test;
 mod verify;
@@ -44,6 +45,7 @@ pub use plan::plan;
 pub use run::run;
 #[cfg(feature = "sila")]
 pub use serve::serve;
+pub use shell::{completions, man};
 pub use study::study;
 pub use test::test;
 pub use verify::verify;
@@ -52,10 +54,12 @@ pub use view::view;
 use crate::Exit;
 use crate::terminal::{Stream, print, print_error};
 
-/// Prints the versions of the command, the language and the compiled program.
+/// Prints the versions of the command, the language and the compiled program, and the commit of a release build.
 pub fn version() -> Exit {
     let version = env!("CARGO_PKG_VERSION");
-    print(Stream::Out, &format!("matterixc {version} (mtx 1, program {})\n", matterix_ir::program::PROGRAM_VERSION));
+    let commit = option_env!("MATTERIX_COMMIT").map(|commit| format!(", commit {commit}")).unwrap_or_default();
+    let program = matterix_ir::program::PROGRAM_VERSION;
+    print(Stream::Out, &format!("matterixc {version} (mtx 1, program {program}{commit})\n"));
     Exit::Fine
 }
 
