@@ -13,6 +13,7 @@ pub mod elaborate;
 mod escapes;
 pub mod eval;
 mod fixpoint;
+mod hints;
 pub mod import;
 pub mod inventory;
 mod labs;

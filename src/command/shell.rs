@@ -15,7 +15,8 @@ pub fn completions(args: &CompletionsArgs) -> Exit {
 
 /// Writes a page for the command and one for each subcommand: `matterixc.1`, `matterixc-run.1`.
 pub fn man(args: &ManArgs) -> Exit {
-    let written = std::fs::create_dir_all(&args.folder).and_then(|()| clap_mangen::generate_to(help::cli(), &args.folder));
+    let written =
+        std::fs::create_dir_all(&args.folder).and_then(|()| clap_mangen::generate_to(help::cli(), &args.folder));
     match written {
         Ok(()) => Exit::Fine,
         Err(why) => {

@@ -92,11 +92,11 @@ fn a_ring_is_reported_once() {
 }
 
 /// Message and label of what is found.
-fn labels(name: &str, text: &str) -> Vec<(String, String)> {
-    let path = write(&folder(&format!("labels_{name}")), "bench.mtx", text);
+fn headlines(name: &str, text: &str) -> Vec<(String, String)> {
+    let path = write(&folder(&format!("headlines_{name}")), "bench.mtx", text);
     let lines = matterixc(&["check", &path, "--format", "json"]).out_lines();
     let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_string();
-    lines.iter().map(|l| (text(&l["code"]), text(&l["labels"][0]["text"]))).collect()
+    lines.iter().map(|l| (text(&l["code"]), text(&l["headline"]))).collect()
 }
 
 #[test]
@@ -134,9 +134,9 @@ workflow flatten in bench {
     crush (brick, 1) by press
 }
 ";
-    let found = labels("words", text);
+    let found = headlines("words", text);
     assert_eq!(found, [("need-unmet".into(), "`brick` is 90 mm tall, and `press` has 60 mm".into())]);
-    let worn = labels("worn", &text.replace("60 mm", "100 mm").replace("(brick, 1)", "(brick, 5)"));
+    let worn = headlines("worn", &text.replace("60 mm", "100 mm").replace("(brick, 1)", "(brick, 5)"));
     assert_eq!(worn, [("need-unmet".into(), "5 times wear it out".into())]);
     let wrong = findings("words_wrong", &text.replace("{h as mm}", "{hight as mm}"));
     assert!(wrong.iter().any(|f| f.0 == "unknown-name"), "{wrong:?}");

@@ -24,6 +24,18 @@ impl Unit {
         Unit { symbol: symbol.into(), factor, offset: 0.0 }
     }
 
+    /// This unit, or one a thousandth of it where people would take that for so little: uL for 0.15 mL.
+    pub fn fit_for(&self, si: f64) -> Unit {
+        const FINER: [(&str, &str); 5] = [("L", "mL"), ("mL", "uL"), ("kg", "g"), ("g", "mg"), ("mg", "ug")];
+        let finer = FINER.iter().find(|(coarse, _)| *coarse == self.symbol);
+        match finer {
+            Some((_, fine)) if si != 0.0 && self.of_si(si).abs() < 1.0 => {
+                Unit::scaled(*fine, self.factor / 1e3).fit_for(si)
+            }
+            _ => self.clone(),
+        }
+    }
+
     /// A value in this unit from its SI value.
     pub fn of_si(&self, si: f64) -> f64 {
         (si - self.offset) / self.factor

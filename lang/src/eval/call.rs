@@ -8,6 +8,7 @@ use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::lab::Mode;
 use crate::eval::lab::{Elaborator, Pair};
+use crate::hints;
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -44,7 +45,10 @@ impl<'a> Elaborator<'a> {
                     let d = self.tables.names.unknown(scope.module, n, "function", |k| {
                         matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })
                     });
-                    self.report(d);
+                    self.report(match hints::of_function(&n.text) {
+                        Some(hint) => d.help(hint),
+                        None => d,
+                    });
                     return Value::Error;
                 }
             },

@@ -201,7 +201,9 @@ impl<'a> Elaborator<'a> {
             )
             .because(at_a, format!("this is {p}"));
             if y.dimension.is_one() && y.literal {
-                d = d.help(format!("give the number a unit: `{}`", self.tables.units.symbol(&x.dimension)));
+                // A bare number beside a temperature is hardly meant in kelvin.
+                let usual = if x.point { "degC".to_owned() } else { self.tables.units.symbol(&x.dimension) };
+                d = d.help(format!("give the number a unit: `{usual}`"));
             }
             self.report(d);
             return None;

@@ -10,9 +10,13 @@ use crate::declare::ReactionId;
 use crate::declare::units::unit_error;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::observed::Noting;
+use crate::hints;
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
+
+/// What a set can be folded into.
+const FOLDS: [&str; 6] = ["sum", "product", "min", "max", "all", "any"];
 
 impl<'a> Elaborator<'a> {
     /// Evaluates an expression; what is wrong is reported and gives [`Value::Error`].
@@ -543,6 +547,12 @@ impl<'a> Elaborator<'a> {
             None => self.set(set, scope),
         };
         let Some(items) = items else { return Value::Error };
+        if !FOLDS.contains(&fold.text.as_str()) {
+            let known: Vec<String> = FOLDS.iter().map(|f| format!("`{f}`")).collect();
+            let d = near::unknown(fold, format!("there is no fold `{}`", fold.text), "not a fold");
+            self.report(d.help(format!("use {}", known.join(", "))));
+            return Value::Error;
+        }
         let mut result: Option<Value> = None;
         let is_of_each =
             fold.text == "all" && items.len() > 1 && self.open_members.is_empty() && self.open_calls.is_empty();
@@ -561,17 +571,8 @@ impl<'a> Elaborator<'a> {
             };
             scope.vars.pop();
             result = Some(match result {
-                None => value,
-                Some(so_far) => match self.fold_two(&fold.text, so_far, value, body.span) {
-                    Some(v) => v,
-                    None => {
-                        self.report(
-                            near::unknown(fold, format!("there is no fold `{}`", fold.text), "not a fold")
-                                .help("use `sum`, `product`, `min`, `max`, `all` or `any`"),
-                        );
-                        return Value::Error;
-                    }
-                },
+                None => self.fold_one(&fold.text, value, body.span),
+                Some(so_far) => self.fold_two(&fold.text, so_far, value, body.span),
             });
         }
         result.unwrap_or_else(|| match fold.text.as_str() {
@@ -608,22 +609,30 @@ impl<'a> Elaborator<'a> {
         Some(those.into_iter().map(Value::Instance).collect())
     }
 
-    fn fold_two(&mut self, fold: &str, a: Value, b: Value, span: Span) -> Option<Value> {
-        Some(match fold {
+    /// What a fold makes of the only value.
+    fn fold_one(&mut self, fold: &str, value: Value, span: Span) -> Value {
+        match (fold, value) {
+            ("all" | "any", value @ (Value::Bool(_) | Value::Error)) => value,
+            ("all" | "any", other) => self.expected("a truth value", &other, span),
+            (_, other) => other,
+        }
+    }
+
+    fn fold_two(&mut self, fold: &str, a: Value, b: Value, span: Span) -> Value {
+        match fold {
             "sum" => self.arith(Binary::Add, a, b, span, span, span),
             "product" => self.arith(Binary::Mul, a, b, span, span, span),
-            "min" => self.extreme(BinaryOp::Min, a, b, span),
-            "max" => self.extreme(BinaryOp::Max, a, b, span),
             "all" | "any" => match (a, b) {
                 (Value::Bool(a), Value::Bool(b)) => {
                     let op = if fold == "all" { BinaryOp::And } else { BinaryOp::Or };
                     Value::Bool(self.graph.binary(op, a, b))
                 }
                 (Value::Error, _) | (_, Value::Error) => Value::Error,
-                (a, _) => self.expected("a truth value", &a, span),
+                (Value::Bool(_), other) | (other, _) => self.expected("a truth value", &other, span),
             },
-            _ => return None,
-        })
+            "min" => self.extreme(BinaryOp::Min, a, b, span),
+            _ => self.extreme(BinaryOp::Max, a, b, span),
+        }
     }
 
     /// The members of a finite set: a list, or all instances of a type.
@@ -645,15 +654,13 @@ impl<'a> Elaborator<'a> {
             }
             Value::Error => None,
             other => {
-                self.report(
-                    Diagnostic::error(
-                        codes::TYPE_MISMATCH,
-                        e.span,
-                        format!("{} is not a finite set", other.what()),
-                        "cannot be gone through one by one",
-                    )
-                    .help("use a list `[a, b]`, a capability, or a set such as `m.species`"),
-                );
+                let help = match other {
+                    Value::Range(..) => hints::OF_RANGE,
+                    _ => "use a list `[a, b]`, a capability, or a set such as `m.species`",
+                };
+                let headline = format!("{} is not a finite set", other.what());
+                let place = "cannot be gone through one by one";
+                self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, place).help(help));
                 None
             }
         }

@@ -13,6 +13,7 @@ use crate::ast::{
 use crate::declare::Type;
 use crate::eval::lab::verbs::Verb;
 use crate::eval::{Scope, Value};
+use crate::hints;
 use crate::names::{DeclId, verb_text};
 use crate::near;
 use crate::syntax::{STEP_WORDS, is_step};
@@ -206,6 +207,10 @@ impl<'a> Planner<'a, '_> {
         );
         if let Some(import) = names.import_of(scope.module, &text, |k| matches!(k, ItemKind::Skill { .. })) {
             self.lab.report(import.offered(d));
+            return;
+        }
+        if let Some(hint) = words.first().and_then(|word| hints::of_verb(&word.text)) {
+            self.lab.report(d.help(hint));
             return;
         }
         let mut near = near::nearest(&text, &all);

@@ -228,6 +228,12 @@ pub struct Link {
     asked: (String, Duration),
     /// What was asked last is to be asked once more.
     is_again: bool,
+    /// What the device of this line says by itself, whoever speaks over it: the line of its driver, what it looks like, what is told.
+    by_itself: Vec<(usize, Told)>,
+    /// What it says by itself and nobody needs.
+    ignored: Vec<Pattern>,
+    /// Whose line it is.
+    own: InstanceId,
     /// What devices said by themselves, by the line of their driver: since when it may have been there, and the value.
     heard: BTreeMap<(InstanceId, usize), (Duration, f64)>,
     /// What was heard before says nothing of what is now.
@@ -254,7 +260,27 @@ impl Link {
         let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
         let (debt, asked, is_again) = (port.debt(), (String::new(), Duration::ZERO), false);
         let (done, emptied, gone) = (Duration::ZERO, Duration::ZERO, None);
-        Ok(Link { world, port, codec, timeout, buffer, debt, asked, is_again, heard, done, emptied, gone, texts })
+        let heard_lines = driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some());
+        let by_itself = heard_lines.map(|(line, told)| (line, told.clone())).collect();
+        let (ignored, own) = (driver.ignores.clone(), driver.instance);
+        Ok(Link {
+            world,
+            port,
+            codec,
+            timeout,
+            buffer,
+            debt,
+            asked,
+            is_again,
+            by_itself,
+            ignored,
+            own,
+            heard,
+            done,
+            emptied,
+            gone,
+            texts,
+        })
     }
 
     /// Makes ready to say this. Nothing is said to a device that owes answers but the same once more.
@@ -314,7 +340,7 @@ impl Link {
         }
         self.pick_up(driver);
         // A line that the device has begun by itself goes on.
-        if !speaks_up(driver) {
+        if !self.speaks_up(driver) {
             self.buffer.clear();
         }
         self.asked.1 = self.world.elapsed();
@@ -389,7 +415,7 @@ impl Link {
 
     /// Takes what the device has said by itself behind an answer.
     fn sift(&mut self, driver: &Driver) {
-        while speaks_up(driver) && !self.buffer.is_empty() {
+        while self.speaks_up(driver) && !self.buffer.is_empty() {
             let mut rest = self.buffer.clone();
             match self.codec.take_reply(&mut rest) {
                 Some(Ok(reply)) if self.overheard(&reply, driver) => self.buffer = rest,
@@ -429,16 +455,22 @@ impl Link {
 
     /// Takes what the device says by itself; false of an answer.
     fn overheard(&mut self, reply: &Reply, driver: &Driver) -> bool {
-        for (line, told) in driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some()) {
+        for (line, told) in &self.by_itself {
             if let Some(value) = self.codec.matched(&told.expects, &reply.text).and_then(|n| n.first().copied()) {
                 // What its instrument cannot show is nothing that was said.
                 if showable(told, &[value], &told.expects, told.shows).is_ok() {
-                    self.heard.insert((driver.instance, line), (self.emptied, value));
+                    self.heard.insert((self.own, *line), (self.emptied, value));
                 }
                 return true;
             }
         }
-        driver.ignores.iter().any(|pattern| self.codec.matched(pattern, &reply.text).is_some())
+        let mut ignored = self.ignored.iter().chain(&driver.ignores);
+        ignored.any(|pattern| self.codec.matched(pattern, &reply.text).is_some())
+    }
+
+    /// Whether something may come that nobody asked for.
+    fn speaks_up(&self, driver: &Driver) -> bool {
+        !(self.by_itself.is_empty() && self.ignored.is_empty() && driver.ignores.is_empty())
     }
 
     fn passed(&self, since: Duration) -> Duration {
@@ -609,7 +641,7 @@ impl Line for Link {
     }
 
     fn take_in(&mut self, driver: &Driver, ear: &mut dyn WireTap) {
-        if !hears(driver) {
+        if self.by_itself.is_empty() {
             return;
         }
         for _ in 0..MOST_WAITING {
@@ -690,14 +722,4 @@ pub(crate) fn showable(
         is = format!("{} {}", plain(unit.of_si(value)), unit.symbol);
     }
     Err(DeviceError::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, is.trim())))
-}
-
-/// Whether a device says values by itself.
-fn hears(driver: &Driver) -> bool {
-    driver.told.iter().any(|told| told.heard.is_some())
-}
-
-/// Whether a device says something by itself.
-fn speaks_up(driver: &Driver) -> bool {
-    !driver.ignores.is_empty() || hears(driver)
 }

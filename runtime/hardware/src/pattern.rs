@@ -121,6 +121,18 @@ fn number(unit: &Unit, form: &Form, shown: Shown) -> Result<String, String> {
     }
 }
 
+/// A reply that looks like this: 1 for a number, the first of the words, a letter for anything.
+pub fn example(pattern: &Pattern) -> String {
+    let slot = |slot: &Slot| match slot {
+        Slot::Plain(text) => text.clone(),
+        Slot::Number(unit, form) => form.write(unit.of_si(unit.to_si(1.0))).unwrap_or_else(|_| "1".to_owned()),
+        Slot::Word(choices) => choices.iter().find_map(|c| c.sent.clone()).unwrap_or_default(),
+        Slot::Skip(width) => "x".repeat((*width).into()),
+        Slot::Kept(_) | Slot::Any => "x".to_owned(),
+    };
+    pattern.slots.iter().map(slot).collect()
+}
+
 /// The pattern as it was written, for messages.
 pub fn written(pattern: &Pattern) -> String {
     let piece = |slot: &Slot| match slot {

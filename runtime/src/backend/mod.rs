@@ -82,6 +82,11 @@ pub trait Backend {
         self.value(node, out)
     }
 
+    /// The value of a condition on what a thing is at the end, or at the start; a device says so by what it shows.
+    fn ended(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+        self.value(node, out)
+    }
+
     /// Fails where a node has no value now: something is divided by 0, say.
     fn defined(&mut self, _node: NodeId) -> Result<(), Fault> {
         Ok(())

@@ -15,7 +15,7 @@ impl<'p> Executor<'p, '_> {
     pub(super) fn in_order(&mut self) -> Result<Vec<&'p Limit>, Fault> {
         let mut begun = Vec::new();
         for end in &self.plan.ends {
-            match self.holds(&end.condition) {
+            match self.ended(&end.condition) {
                 Ok(Some(true)) => begun.push(end),
                 Ok(_) => {}
                 Err(fault) => match fault.code {
@@ -35,7 +35,7 @@ impl<'p> Executor<'p, '_> {
             return Ok(());
         }
         for end in begun {
-            if self.holds(&end.condition)? != Some(false) {
+            if self.ended(&end.condition)? != Some(false) {
                 continue;
             }
             let how = end.condition.refusal.as_ref().map_or("unfinished".to_owned(), |r| r.failure.replace('_', " "));

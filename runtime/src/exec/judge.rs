@@ -48,6 +48,15 @@ impl Executor<'_, '_> {
         Ok(value.map(truth))
     }
 
+    /// Whether a thing is as it should be at the end; none where that cannot be known.
+    pub(super) fn ended(&mut self, condition: &Condition) -> Result<Option<bool>, Fault> {
+        let value = self.backend.ended(condition.node, self.out).map_err(|f| at(f, condition.span))?;
+        if value.is_some() {
+            self.backend.defined(condition.node).map_err(|f| at(f, condition.span))?;
+        }
+        Ok(value.map(truth))
+    }
+
     /// Whether a condition holds; one that cannot be known is assumed to.
     pub(super) fn judge(&mut self, step: StepId, condition: &Condition) -> Result<bool, Fault> {
         let holds = self.holds(condition)?;

@@ -79,6 +79,136 @@ fn a_device_that_goes_on_after_it_took_safe_is_named() {
     assert!(said.contains(wanted), "{said}");
 }
 
+/// One half of what should hold that is known to be broken decides it, whatever the driver does not tell.
+#[test]
+fn what_is_known_of_the_end_decides_whether_a_device_is_safe() {
+    let pump = doser("ID A\r", |line, _| (line == "H").then_some(Answer::Says("OK\r")));
+    let other = doser("ID B\r", |line, _| (line == "R").then_some(Answer::HangsUp));
+    let dir = bench("believed_half", LAB, "pump", "");
+    let text = LAB
+        .replace("expect pump.going; rest pump; ", "")
+        .replace("state going", "state warm: Bool = false\n    state going")
+        .replace("ends not going", "ends not (going or warm)");
+    write(&dir, "lab.mtx", text);
+    let ended = goes(&dir, "breaks", &pump.address, &other.address, "");
+    let said = flat(&ended);
+    assert!(ended.code == 1 && said.contains("could not be made safe: `pump`: it took what makes it safe"), "{said}");
+}
+
+/// What a device is at the end is judged by what it shows, also where that is a reading of a true value.
+#[test]
+fn a_reading_says_how_a_device_is_at_the_end() {
+    const FURNACE: &str = "mtx 1
+capability Furnace {
+    state hot: Bool = false
+    state temp: Temperature = 25 degC
+    reading temperature: Temperature = temp
+    command heat
+        effect hot = true
+    command cool
+        effect hot = false
+    ends temp <= 60 degC else left_hot \"cool it\"
+}
+asset Oven: Furnace
+driver OvenLine for Oven over tcp(framing: cr, timeout: 300 ms) {
+    heat sends \"ON\" expects \"OK\"
+    cool sends \"OFF\" expects \"OK\"
+    reading temperature asks \"T?\" expects \"T={degC}\"
+    safe sends \"OFF\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, f = Oven }
+workflow go in bench { heat f; wait 300 ms; cool f }
+";
+    let hot = Mutex::new(false);
+    let device = Device::start(b'\r', move |line, _| {
+        let mut hot = hot.lock().expect("not poisoned");
+        *hot |= line == "ON";
+        match line {
+            "T?" => Answer::Says(if *hot { "T=150.0\r" } else { "T=25.0\r" }),
+            _ => Answer::Says("OK\r"),
+        }
+    });
+    let dir = bench("believed_shown", FURNACE, "f", &device.address);
+    let ended = deploy_at("1", &dir, &["--mode", "real"]);
+    let said = flat(&ended);
+    assert!(ended.code == 1 && said.contains("`f` is left hot"), "{said}");
+    assert!(said.contains("could not be made safe: `f`: it took what makes it safe, and still is left hot"), "{said}");
+}
+
+#[test]
+fn an_answer_that_looks_like_what_is_said_unasked_is_refused() {
+    const HOSTED: &str = "mtx 1
+capability Host: Body {
+    state chamber: Temperature = 25 degC
+    reading inside: Temperature = chamber
+}
+capability Probe: Body {
+    state t: Temperature = 25 degC
+    reading temperature: Temperature = t
+}
+asset Tip: Probe { mass: 1 kg }
+asset Box: Host { mass: 1 kg, left = Tip { } }
+driver HostLine for Box over tcp(framing: cr, timeout: 2 s) { reading inside hears \"T={degC}\" every 1 s }
+driver TipLine for Tip over HostLine { reading temperature asks \"A?\" expects \"T={degC}\" }
+lab bench { ambient: 22 degC, h = Box at (0, 0, 0) m }
+workflow go in bench { let a = h.left.temperature; note \"{a}\" }
+";
+    let dir = bench("believed_alike", HOSTED, "h", "localhost:1");
+    let ended = deploy_at("1", &dir, &[]);
+    let said = flat(&ended);
+    let wanted = "`T={degC}`, which `TipLine` expects, cannot be told from what `HostLine` says by itself";
+    assert!(ended.code == 1 && said.contains(wanted), "{said}");
+    write(&dir, "lab.mtx", HOSTED.replace("expects \"T=", "expects \"A="));
+    let ended = deploy_at("1", &dir, &[]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}
+
+/// Two devices with addresses on one line, which is cut while both are on: when it is back, another one has the second address.
+#[test]
+fn whoever_shares_a_line_that_was_opened_anew_is_asked_too() {
+    let text = LAB
+        .replace("driver DoserLine", "framing addressed { carries: text, request: \"{address}:{data}\\r\", reply: \"{address}:{data}\\r\" }\ndriver DoserLine")
+        .replace("tcp(framing: cr, timeout: 300 ms)", "tcp(framing: addressed, timeout: 300 ms, address: 1)");
+    let text = text.replace("workflow go in bench { run pump;", "workflow go in bench { run other; run pump;");
+    let heard = Arc::new(Mutex::new(Vec::new()));
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let told = Arc::clone(&heard);
+    std::thread::spawn(move || {
+        for (turn, stream) in listener.incoming().flatten().enumerate() {
+            let mut out = stream.try_clone().expect("a stream");
+            for line in BufReader::new(stream).split(b'\r').map_while(Result::ok) {
+                let line = String::from_utf8_lossy(&line).into_owned();
+                told.lock().expect("not poisoned").push((turn, line.clone()));
+                let (unit, said) = line.split_once(':').expect("an address");
+                let answer = match (said, unit, turn) {
+                    ("ID?", "2", 1..) => "ID ZZ".to_owned(),
+                    ("ID?", unit, _) => format!("ID {unit}"),
+                    ("G?", ..) => "G 0".to_owned(),
+                    ("H", "1", 0) => {
+                        let _ = out.shutdown(Shutdown::Both);
+                        break;
+                    }
+                    _ => "OK".to_owned(),
+                };
+                if out.write_all(format!("{unit}:{answer}\r").as_bytes()).is_err() {
+                    break;
+                }
+            }
+        }
+    });
+    let dir =
+        bench("believed_shared", &text.replace("reading going asks", "reading going while not going asks"), "pump", "");
+    let bindings = format!("[pump]\naddress = \"{address}\"\n[other]\naddress = \"{address}\"\nunit = \"2\"\n");
+    write(&dir, "lab.toml", bindings);
+    let ended = deploy_at("1", &dir, &["--mode", "real", "--workflow", "go"]);
+    let said = flat(&ended);
+    assert!(ended.code == 1 && said.contains("could not be made safe: `other`: it says that it is `ZZ`"), "{said}");
+    let heard = heard.lock().expect("not poisoned");
+    let later: Vec<&str> = heard.iter().filter(|(turn, _)| *turn > 0).map(|(_, line)| line.as_str()).collect();
+    assert!(later.contains(&"2:ID?") && !later.contains(&"2:H"), "{later:?}");
+}
+
 #[test]
 fn a_device_that_is_on_at_the_end_is_made_safe() {
     // Somebody starts it again at its panel after the plan has stopped it.
@@ -203,6 +333,7 @@ workflow waits in bench {
     let b = v.net
     note \"weighed {b - a as g :.3} g\"
 }
+workflow at_once in bench { let a = v.net; zero v; let b = v.net; note \"weighed {b as g :.3} g\" }
 workflow zeroes in bench { let a = v.net; wait 300 ms; zero v; let b = v.net; note \"weighed {b as g :.3} g\" }
 ";
 
@@ -232,7 +363,9 @@ fn streamer(every: Duration) -> String {
 
 #[test]
 fn what_a_device_says_by_itself_is_of_now() {
-    for (workflow, every, passed) in [("waits", 5, 3.7..4.3), ("waits", 200, 3.7..4.3), ("zeroes", 200, 0.0..0.5)] {
+    for (workflow, every, passed) in
+        [("waits", 5, 3.7..4.3), ("waits", 200, 3.7..4.3), ("zeroes", 200, 0.0..0.5), ("at_once", 200, 0.0..0.5)]
+    {
         let dir = bench(&format!("believed_{workflow}_{every}"), STREAM, "v", &streamer(Duration::from_millis(every)));
         let ended = deploy_at("1", &dir, &["--mode", "real", "--workflow", workflow]);
         let said = ended.err.split("weighed ").nth(1).and_then(|rest| rest.split(' ').next());

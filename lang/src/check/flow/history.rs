@@ -156,12 +156,27 @@ impl Interpreter<'_, '_> {
                     if steps.len() == STEPS_SHOWN {
                         break;
                     }
-                    let text = format!("`{}` is {} after this", term.name, self.show(&after, &term.domain));
+                    let text = format!("{} after this", self.said(term, &after));
                     steps.push((event.span, text));
                 }
             }
             at = event.earlier.clone();
         }
         steps
+    }
+
+    /// What a member is; of how much a mixture holds, which no state of its own says, that its vessel holds it.
+    fn said(&self, term: &Term, value: &AbstractValue) -> String {
+        let domain = match (&term.domain, value.exact()) {
+            (Domain::Quantity(unit), Some(si)) => Domain::Quantity(unit.fit_for(si)),
+            (domain, _) => domain.clone(),
+        };
+        let shown = self.show(value, &domain);
+        let is_worked_out = !matches!(self.lab.graph.op(term.node), Op::State(_));
+        let held = [".volume", ".mass"].into_iter().find_map(|member| term.name.strip_suffix(member));
+        match held.filter(|_| is_worked_out) {
+            Some(vessel) => format!("`{}` holds {shown}", vessel.strip_suffix(".contents").unwrap_or(vessel)),
+            None => format!("`{}` is {shown}", term.name),
+        }
     }
 }

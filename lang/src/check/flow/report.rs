@@ -165,7 +165,7 @@ impl Interpreter<'_, '_> {
             Some(r) => format!("`{label}` cannot be done: {}", r.failure.replace('_', " ")),
             None => format!("`{label}` cannot be done: it needs `{}`", need.text),
         };
-        self.demand(what, need, facts, some);
+        self.demand(what, "this cannot be done", need, facts, some);
     }
 
     /// Something presumed that holds on no way.
@@ -175,18 +175,20 @@ impl Interpreter<'_, '_> {
             Some(r) => format!("`{label}` is out of place: {}", r.failure.replace('_', " ")),
             None => format!("`{label}` is out of place: it presumes `{}`", presumed.text),
         };
-        self.demand(what, presumed, facts, false);
+        self.demand(what, "this is out of place", presumed, facts, false);
     }
 
-    fn demand(&mut self, what: String, need: &Condition, facts: &AbstractState, some: bool) {
+    /// A demand that does not hold: in its own words where it has them, which a label at the step then says the consequence of.
+    fn demand(&mut self, what: String, so: &str, need: &Condition, facts: &AbstractState, some: bool) {
         let code = need.code();
         let open = some.then(|| self.ways.meetings());
         let some = some || self.doubt > 0;
-        let headline = if some { format!("{what}, on some ways through the plan") } else { what };
         let failing = self.failing(need, facts);
         let asked = failing.first().copied().unwrap_or(need);
         let words = self.worded(need, facts);
-        let measured = if words.is_empty() { self.measured(asked, facts) } else { words.clone() };
+        let what = if words.is_empty() { what } else { words.join(", ") };
+        let headline = if some { format!("{what}, on some ways through the plan") } else { what };
+        let measured = if words.is_empty() { self.measured(asked, facts) } else { vec![so.to_owned()] };
         let named = !failing.is_empty() && failing.len() < need.each.len();
         let said = match (named, measured.is_empty()) {
             (true, true) => format!("not for {}", listed(&failing)),
@@ -311,8 +313,10 @@ impl Interpreter<'_, '_> {
         let name = self.lab.spoken_name(end.instance);
         let how = condition.refusal.as_ref().map_or("unfinished".to_string(), |r| r.failure.replace('_', " "));
         let headline = format!("`{}` {ends}, and `{name}` is {how}", self.plan.workflow);
-        let d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
-        let mut d = d.because(condition.span, format!("looked for here: `{}`", condition.text));
+        let mut d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
+        if !self.in_library(condition.span) {
+            d = d.because(condition.span, format!("looked for here: `{}`", condition.text));
+        }
         d.help.extend(condition.advice());
         Some(d)
     }

@@ -35,6 +35,27 @@ impl Backend for Hardware<'_, '_> {
         self.eval(node, out).map(Some)
     }
 
+    fn ended(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+        let model = &self.program.model;
+        let shown = if self.is_dry() { Vec::new() } else { self.observed.shows(model, node) };
+        let readings = shown.into_iter().filter(|n| !self.observed.told.contains_key(n));
+        let readings: Vec<NodeId> = readings.collect();
+        if readings.is_empty() {
+            return self.eval(node, out).map(Some);
+        }
+        // A reading in place of the true value that it shows, as nothing else is known of a device.
+        let all = self.observed.shows(model, node);
+        let mut values = std::collections::BTreeMap::new();
+        for n in all {
+            let teller = if readings.contains(&n) { self.observed.reading_of(model, n) } else { Some(n) };
+            if let Some(teller) = teller {
+                let told = self.told(teller, out)?;
+                values.insert(n, told);
+            }
+        }
+        Ok(Some(self.with_told(node, values)))
+    }
+
     fn observe(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
         match self.observed.asks(&self.program.model, node) {
             (_, true) if !self.is_dry() => Ok(None),
@@ -204,6 +225,7 @@ impl Hardware<'_, '_> {
                 }
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };
+            self.fresh.clear();
             self.beat(true, out)?;
             self.keep_abreast(Turn::Told(number), out)?;
         }
@@ -309,6 +331,7 @@ impl Hardware<'_, '_> {
             if let Some(running) = self.running.get_mut(&ticket) {
                 running.ready = true;
             }
+            self.fresh.clear();
             self.keep_abreast(Turn::Ready(ticket.0), out)?;
             if !self.is_dry() {
                 self.twin.hasten(twin);
@@ -317,6 +340,7 @@ impl Hardware<'_, '_> {
         match self.twin.poll(twin, out)? {
             Status::Running { until, watch } => Ok(Status::Running { until, watch }),
             ended => {
+                self.fresh.clear();
                 let running = self.running.remove(&ticket);
                 if let Some(running) = running {
                     if running.changed && running.exchange.is_some_and(|e| e.until.is_some()) && self.is_live() {

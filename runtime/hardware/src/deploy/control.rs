@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::journal::Gate;
 
@@ -33,6 +34,9 @@ impl Answer {
     }
 }
 
+/// Nobody has read a question and answered it so soon after it was prompted for in place of another one.
+const UNREAD: Duration = Duration::from_millis(300);
+
 /// What is shown to whoever is at the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Notice<'t> {
@@ -53,7 +57,7 @@ pub enum Notice<'t> {
 pub enum Taken {
     /// It is the answer to the question that was prompted for.
     Yes,
-    /// It is none: the question that was prompted for before was withdrawn, or answered elsewhere, and it may be meant for that.
+    /// It is none: the question that was prompted for before was withdrawn, answered elsewhere or just now, and it may be meant for that.
     Overtaken,
     /// Nothing is asked.
     Nothing,
@@ -78,6 +82,8 @@ struct Said {
     prompted: Option<u64>,
     /// One that was prompted for is over without an answer there: what is typed next may be meant for that.
     overtaken: bool,
+    /// When the prompt last went from one question to the next.
+    moved: Option<Instant>,
     /// Answers that were ever given.
     given: usize,
     /// Answers every question at once.
@@ -100,6 +106,7 @@ impl Said {
         let next = self.open.first_key_value();
         self.prompted = next.map(|(number, _)| *number);
         if let Some((_, text)) = next {
+            self.moved = Some(Instant::now());
             show(Notice::Prompt(text));
         }
     }
@@ -114,6 +121,7 @@ impl Control {
             answers: BTreeMap::new(),
             prompted: None,
             overtaken: false,
+            moved: None,
             given: 0,
             standing: None,
             gates: VecDeque::new(),
@@ -174,7 +182,7 @@ impl Control {
         let Some(question) = said.prompted else {
             return if is_overtaken { Taken::Overtaken } else { Taken::Nothing };
         };
-        if is_overtaken {
+        if is_overtaken || said.moved.is_some_and(|moved| moved.elapsed() < UNREAD) {
             return Taken::Overtaken;
         }
         if let Some(text) = said.open.remove(&question) {

@@ -132,7 +132,7 @@ pub struct Hardware<'m, 't> {
     pub(super) tickets: u64,
     /// How often watchdogs have been fed, or told that they need not listen.
     pub(super) fed: u64,
-    /// What was told at this instant.
+    /// What was told at this instant, since a command was last taken or finished.
     pub(super) fresh: BTreeMap<NodeId, (f64, f64)>,
     pub(super) cancelled: bool,
     /// Who goes on after a journal.

@@ -53,8 +53,7 @@ impl Hardware<'_, '_> {
 
     /// The same of all devices behind a line.
     pub(super) fn same_behind(&mut self, line: usize) -> Result<(), (usize, DeviceError, Span)> {
-        let behind = (0..self.devices.len()).filter(|device| self.line_of(*device) == line);
-        behind.collect::<Vec<_>>().into_iter().try_for_each(|device| self.same(device))
+        self.behind(line).into_iter().try_for_each(|device| self.same(device))
     }
 
     /// What a device answers to one question who it is: words and texts.

@@ -1,6 +1,7 @@
 //! A plan on devices: what must be known before, the backend that talks to them, the journal of what it said.
 
 mod abreast;
+mod alike;
 mod alive;
 mod backend;
 mod between;

@@ -10,6 +10,8 @@ use matterix_ir::{NodeId, Op};
 pub struct Observed {
     /// By node: device and line of its driver.
     pub told: BTreeMap<NodeId, (usize, usize)>,
+    /// The same, also of the true values that readings show: what a device is at the end is judged by what it shows.
+    pub shown: BTreeMap<NodeId, (usize, usize)>,
     /// States that change by laws or with transfers.
     hidden: BTreeSet<u32>,
     /// States that change by laws.
@@ -23,7 +25,36 @@ impl Observed {
             model.derivatives.iter().filter(|d| model.graph.constant(d.rate) != Some(0.0)).map(|d| d.state).collect();
         let extensive = model.mixtures.iter().flat_map(|m| m.extensive.iter().map(|(_, state)| *state));
         let hidden = moving.iter().copied().chain(extensive).collect();
-        Observed { told, hidden, moving }
+        let readings = told.iter().filter_map(|(node, line)| match model.graph.op(*node) {
+            Op::Reading(r) => Some((model.readings.get(r as usize)?.value, *line)),
+            _ => None,
+        });
+        let mut shown: BTreeMap<NodeId, (usize, usize)> = readings.collect();
+        shown.extend(&told);
+        Observed { told, shown, hidden, moving }
+    }
+
+    /// The outermost nodes in one that devices tell, or show.
+    pub fn shows(&self, model: &Model, node: NodeId) -> Vec<NodeId> {
+        let (mut found, mut seen, mut open) = (Vec::new(), BTreeSet::new(), vec![node]);
+        while let Some(node) = open.pop() {
+            match seen.insert(node) {
+                false => {}
+                true if self.shown.contains_key(&node) => found.push(node),
+                true => open.extend(model.graph.op(node).operands()),
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The reading that shows a true value.
+    pub fn reading_of(&self, model: &Model, value: NodeId) -> Option<NodeId> {
+        let shows = |node: &NodeId| match model.graph.op(*node) {
+            Op::Reading(r) => model.readings.get(r as usize).is_some_and(|reading| reading.value == value),
+            _ => false,
+        };
+        self.told.keys().copied().find(shows)
     }
 
     /// What a node asks devices for: the outermost told nodes in it, and whether beside them it needs what is only supposed.

@@ -58,6 +58,7 @@ impl Hardware<'_, '_> {
             }
         };
         self.questions.remove(&ticket);
+        self.fresh.clear();
         if answer.yes && self.is_live() {
             self.check_settings()?;
         }

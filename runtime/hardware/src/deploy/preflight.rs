@@ -8,6 +8,7 @@ use matterix_ir::plan::{Operation, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Program, Span, codes};
 
+use super::alike::alike;
 use super::device::{Carrier, Device};
 use super::observe::Observed;
 use super::unbound::{key, lines, teller};
@@ -40,6 +41,7 @@ pub fn preflight(program: &Program, devices: &[Device<'_>], observed: &Observed)
     unasked.retain(|key, _| !untold.contains_key(key));
     found.extend(untold.into_iter().map(|(key, places)| not_bound(program, key, places, codes::UNDRIVEN)));
     found.extend(unasked.into_iter().map(|(key, places)| not_bound(program, key, places, codes::UNOBSERVED)));
+    found.extend(alike(devices));
     let mut seen = BTreeSet::new();
     found.retain(|d| seen.insert((d.code.name, d.span(), d.headline.clone())));
     found

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use matterix_ir::graph::BinaryOp;
 use matterix_ir::wire::{Driver, Framing};
 use matterix_ir::{NodeId, Op};
 
@@ -41,18 +42,18 @@ impl Hardware<'_, '_> {
         }
     }
 
-    /// What should hold at the end of a plan holds of a device by what it tells of itself: one that took what makes it safe may go on
-    /// all the same, as under local control.
+    /// What should hold at the end of a plan holds of a device by what it tells of itself, as far as that decides it: one that took what
+    /// makes it safe may go on all the same, as under local control.
     pub(super) fn has_ended(&mut self, index: usize) -> Result<(), DeviceError> {
         let program = self.program;
         let instance = self.devices[index].binding.instance;
         let begun = self.settings.world.elapsed();
         for end in program.plan.ends.iter().filter(|end| end.instance == instance) {
-            let Some(told) = self.tells(index, end.condition.node) else { continue };
+            let told = self.tells(index, end.condition.node);
             loop {
-                let trouble = match self.holds_by(index, end.condition.node, &told) {
-                    Ok(true) => break,
-                    Ok(false) => {
+                let trouble = match self.decided_by(index, end.condition.node, &told) {
+                    Ok(None | Some(true)) => break,
+                    Ok(Some(false)) => {
                         let how = end.condition.failure().replace('_', " ");
                         let text = format!("it took what makes it safe, and still is {how} by what it tells");
                         DeviceError::Refused { failure: end.condition.failure().to_owned(), text }
@@ -69,45 +70,64 @@ impl Hardware<'_, '_> {
         Ok(())
     }
 
-    /// The lines of its driver by which a device tells all that a condition depends on; none where it does not, or not now.
-    fn tells(&self, index: usize, condition: NodeId) -> Option<Vec<(NodeId, usize)>> {
-        let model = &self.program.model;
-        if !self.observed.is_settled(model, condition) {
-            return None;
-        }
-        let (nodes, _) = self.observed.asks(model, condition);
-        let covers = |op: Op| matches!(op, Op::State(_) | Op::Local(_));
-        let mut rest = vec![condition];
-        while let Some(node) = rest.pop() {
-            match model.graph.op(node) {
-                _ if nodes.contains(&node) => {}
-                op if covers(op) => return None,
-                op => rest.extend(op.operands()),
-            }
-        }
-        let line = |node: NodeId| match self.observed.told.get(&node) {
+    /// The lines of its driver by which a device tells what a condition depends on, where it does so now.
+    fn tells(&mut self, index: usize, condition: NodeId) -> Vec<(NodeId, usize)> {
+        let nodes = self.observed.shows(&self.program.model, condition);
+        let of_this = nodes.into_iter().filter_map(|node| match self.observed.shown.get(&node) {
             Some((device, line)) if *device == index => Some((node, *line)),
             _ => None,
-        };
-        nodes.into_iter().map(line).collect::<Option<Vec<_>>>().filter(|lines| !lines.is_empty())
+        });
+        let applies: Vec<(NodeId, usize)> = of_this.collect();
+        let Some(driver) = self.devices[index].driver else { return Vec::new() };
+        let engine = self.twin.engine();
+        let holds = |line: usize| driver.told[line].condition.is_none_or(|c| engine.eval(c) != 0.0);
+        applies.into_iter().filter(|(_, line)| holds(*line)).collect()
     }
 
-    /// Whether a condition holds by what a device tells now.
-    fn holds_by(&mut self, index: usize, condition: NodeId, told: &[(NodeId, usize)]) -> Result<bool, DeviceError> {
-        let Some(driver) = self.devices[index].driver else { return Ok(true) };
+    /// Whether a condition holds by what a device tells now; nothing where that does not decide it.
+    fn decided_by(
+        &mut self,
+        index: usize,
+        condition: NodeId,
+        told: &[(NodeId, usize)],
+    ) -> Result<Option<bool>, DeviceError> {
+        let Some(driver) = self.devices[index].driver else { return Ok(None) };
         let mut values = BTreeMap::new();
         for (node, line) in told {
             let told = &driver.told[*line];
-            if told.condition.is_some_and(|c| self.twin.engine().eval(c) == 0.0) {
-                return Ok(true);
-            }
             let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
             let asked = self.over(index, |link, driver, ear| match told.heard {
                 Some(_) => link.hear(*line, driver, ear),
                 None => link.ask(&text, told, driver, ear),
             });
-            values.insert(*node, asked?);
+            values.insert(*node, Some(asked?));
         }
-        Ok(self.with_told(condition, values) != 0.0)
+        Ok(self.decided(condition, &mut values).map(|value| value != 0.0))
+    }
+
+    /// A value as far as these and what never changes decide it: a part that is false decides an `and`, whatever the others are.
+    fn decided(&mut self, node: NodeId, values: &mut BTreeMap<NodeId, Option<f64>>) -> Option<f64> {
+        let graph = &self.program.model.graph;
+        for n in graph.schedule([node]) {
+            if values.contains_key(&n) {
+                continue;
+            }
+            let op = graph.op(n);
+            let known = |o: NodeId| values.get(&o).copied().flatten();
+            let value = match op {
+                Op::State(_) | Op::Local(_) | Op::Reading(_) | Op::Time => None,
+                Op::Binary(BinaryOp::And, a, b) if known(a) == Some(0.0) || known(b) == Some(0.0) => Some(0.0),
+                Op::Binary(BinaryOp::Or, a, b) if [a, b].into_iter().any(|o| known(o).is_some_and(|v| v != 0.0)) => {
+                    Some(1.0)
+                }
+                op if op.operands().next().is_none() => Some(self.twin.engine().eval(n)),
+                op if op.operands().all(|o| known(o).is_some()) => {
+                    Some(matterix_ir::graph::apply(op, |_| f64::NAN, |o| known(o).unwrap_or(f64::NAN)))
+                }
+                _ => None,
+            };
+            values.insert(n, value);
+        }
+        values.get(&node).copied().flatten()
     }
 }

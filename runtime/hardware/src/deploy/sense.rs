@@ -107,12 +107,26 @@ impl Hardware<'_, '_> {
         }
     }
 
-    /// A line is open from here on; who is behind it has not said so yet.
+    /// A line is open from here on; who is behind it has not said so yet, under any of its addresses.
     pub(super) fn put_through(&mut self, line: usize, link: Box<dyn Line>) {
         (self.devices[line].link, self.devices[line].lost) = (Some(link), None);
-        for device in 0..self.devices.len() {
-            self.devices[device].known &= self.line_of(device) != line;
+        for device in self.behind(line) {
+            self.devices[device].known = false;
         }
+    }
+
+    /// The devices behind a line: also those that share its port or connection.
+    pub(super) fn behind(&self, line: usize) -> Vec<usize> {
+        let place = |index: usize| match &self.devices[index].binding.carrier {
+            Carrier::Line { place, .. } => Some(place),
+            _ => None,
+        };
+        let here = place(line);
+        let is_behind = |device: &usize| {
+            let of = self.line_of(*device);
+            of == line || (here.is_some() && place(of) == here)
+        };
+        (0..self.devices.len()).filter(is_behind).collect()
     }
 
     pub(super) fn set_clock(&mut self) {

@@ -68,6 +68,10 @@ impl<'m> Hardware<'m, '_> {
             return Ok(Vec::new());
         }
         let line = self.line_of(index);
+        if self.devices[line].said {
+            // Over a line that was opened anew another device may answer. Before anything was said, all were asked.
+            self.same(index).map_err(|(_, trouble, _)| trouble)?;
+        }
         self.devices[line].said = true;
         self.devices[index].told = true;
         self.settings.exposed.told(self.devices[line].name);
@@ -206,6 +210,9 @@ impl<'m> Hardware<'m, '_> {
                 }
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
+        }
+        if self.devices[self.line_of(index)].said && self.devices[self.line_of(index)].link.is_some() {
+            self.same(index).map_err(|(_, trouble, at)| self.trouble(index, &trouble, at))?;
         }
         let asked = self.inquire(index, |link, driver, ear| match told.heard {
             Some(_) => link.hear(line, driver, ear),

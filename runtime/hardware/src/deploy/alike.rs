@@ -1,0 +1,49 @@
+//! Answers that cannot be told from what a device says by itself over the same line.
+
+use matterix_ir::wire::{Driver, Framing, Pattern};
+use matterix_ir::{Diagnostic, codes};
+
+use super::device::Device;
+use crate::pattern::{example, matched, written};
+
+/// Findings about drivers whose answers look like lines that nobody asked for: they would be taken for these.
+pub(super) fn alike(devices: &[Device<'_>]) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    for device in devices {
+        let line = device.host.map_or(device, |host| &devices[host]);
+        let (Some(driver), Some(of)) = (device.driver, line.driver) else { continue };
+        if matches!(of.framing, Framing::Json | Framing::Calls) {
+            continue;
+        }
+        for answer in expected(driver) {
+            let said = by_itself(of).find(|said| matched(said, &example(answer)).is_some());
+            let Some(said) = said else { continue };
+            let headline = format!(
+                "`{}`, which `{}` expects, cannot be told from what `{}` says by itself",
+                written(answer),
+                driver.name,
+                of.name
+            );
+            let d = Diagnostic::error(codes::DRIVER_LINE, answer.span, headline, "looks the same");
+            let d = d.because(said.span, format!("said by itself: `{}`", written(said)));
+            found.push(d.help("let the device say it in another form, or not by itself"));
+        }
+    }
+    found
+}
+
+/// What a device says without being asked.
+fn by_itself(driver: &Driver) -> impl Iterator<Item = &Pattern> {
+    let heard = driver.told.iter().filter(|told| told.heard.is_some()).map(|told| &told.expects);
+    heard.chain(&driver.ignores)
+}
+
+/// What a driver expects as answers.
+fn expected(driver: &Driver) -> impl Iterator<Item = &Pattern> {
+    let asked = driver.told.iter().filter(|told| told.heard.is_none());
+    let told = asked.flat_map(|told| told.forms().map(|(form, _)| form));
+    let calls = driver.calls.iter().map(|(_, exchange)| exchange).chain(driver.said_apart());
+    let answers =
+        calls.flat_map(|exchange| exchange.expects.iter().chain(exchange.until.iter().flat_map(|u| &u.expects)));
+    told.chain(answers).flat_map(|pattern| std::iter::once(pattern).chain(&pattern.then))
+}
