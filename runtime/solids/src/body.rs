@@ -90,6 +90,11 @@ impl Body {
         Some(Body { pieces, around })
     }
 
+    /// Its convex pieces, each with its place in the frame of the body.
+    pub fn pieces(&self) -> impl Iterator<Item = (Isometry, &SharedShape)> {
+        self.pieces.iter().map(|piece| (piece.at, &piece.shape))
+    }
+
     /// How far its farthest point may be from the origin of its frame, m.
     pub fn reach(&self) -> f64 {
         self.around.mins.abs().max(self.around.maxs.abs()).length()
