@@ -237,6 +237,11 @@ impl World {
         self.steps += 1;
     }
 
+    /// Nothing moves until it would have made so many steps: they are counted without being made.
+    pub fn rest_until(&mut self, steps: u64) {
+        self.steps = self.steps.max(steps);
+    }
+
     /// How many steps it has made.
     pub fn steps(&self) -> u64 {
         self.steps

@@ -45,6 +45,8 @@ pub(super) struct Robots {
     next: usize,
     /// The first burden that has not been written.
     told: usize,
+    /// The first stray that has not been written.
+    strayed: usize,
 }
 
 impl Robots {
@@ -57,7 +59,7 @@ impl Robots {
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
         let (names, hands) = (BTreeMap::new(), BTreeMap::new());
-        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, hands, next: 0, told: 0 };
+        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, hands, next: 0, told: 0, strayed: 0 };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
@@ -96,6 +98,7 @@ impl Robots {
         let mut travelled = false;
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
+            self.strays(run, moment.time, sink, frames, replay)?;
             replay.moment(moment);
             self.grip(replay, moment, sink)?;
             self.burdens(run, moment.time, sink)?;
@@ -114,8 +117,28 @@ impl Robots {
                 sink.push(frames, moment.time, &FrameTransforms { transforms })?;
             }
         }
+        travelled |= self.strays(run, time, sink, frames, replay)?;
         self.burdens(run, time, sink)?;
         Ok(travelled)
+    }
+
+    /// Writes where loose things have moved up to a time, s; whether any have.
+    fn strays<W: Write + Seek>(
+        &mut self,
+        run: &Run<'_>,
+        time: f64,
+        sink: &mut Sink<W>,
+        frames: u16,
+        replay: &mut Replay<'_>,
+    ) -> McapResult<bool> {
+        let first = self.strayed;
+        while let Some(stray) = run.recording.strays.get(self.strayed).filter(|stray| stray.time <= time) {
+            self.strayed += 1;
+            let going = replay.strayed(stray).into_iter();
+            let transforms = going.map(|(id, at)| transform(stray.time, &run.program.scene.get(id).name, at)).collect();
+            sink.push(frames, stray.time, &FrameTransforms { transforms })?;
+        }
+        Ok(self.strayed > first)
     }
 
     /// Writes what is in a hand, with all that goes along, where that is something else than before.
