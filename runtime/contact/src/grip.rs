@@ -17,7 +17,7 @@ use crate::{Id, thing};
 /// How stiffly the fingers are coupled, N/m, and what brings them to rest without swinging, N s/m.
 const COUPLED: (f64, f64) = (5e4, 150.0);
 /// How stiffly the motor goes where the fingers are to be, N/m and N s/m.
-const DRIVEN: (f64, f64) = (1e4, 100.0);
+const DRIVEN: (f64, f64) = (1e4, 150.0);
 /// What a motor and its gears add to the mass of each finger along its way, kg: as armatures of small grippers are described for simulators.
 const ARMATURE: f64 = 0.5;
 
@@ -36,6 +36,8 @@ pub struct Finger {
     pub axis: [f64; 3],
     /// Its position now, m.
     pub at: f64,
+    /// Its ends, m.
+    pub range: [f64; 2],
 }
 
 /// A gripper.
@@ -47,6 +49,8 @@ pub struct Grip {
     pub fingers: [Finger; 2],
     /// What each presses with at most, N.
     pub force: f64,
+    /// How fast they go at most, m/s.
+    pub speed: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -98,11 +102,18 @@ impl World {
         (all[0][0] + all[1][0]) / 2.0
     }
 
+    /// How fast they open, m/s.
+    pub fn opening(&self, grip: GripId) -> f64 {
+        let Some(joined) = self.grips.get(grip.0) else { return 0.0 };
+        let all = joined.grip.fingers.map(|finger| self.slid(&joined.grip, &finger));
+        (all[0][1] + all[1][1]) / 2.0
+    }
+
     /// How hard each finger presses on a body, N.
     pub fn pinch(&self, grip: GripId, on: Id) -> [f64; 2] {
         let Some(joined) = self.grips.get(grip.0) else { return [0.0; 2] };
         let touches = self.touches(on);
-        joined.grip.fingers.map(|finger| touches.iter().filter(|t| t.by == finger.body).map(|t| t.pressed()).sum())
+        joined.grip.fingers.map(|finger| touches.iter().filter(|t| t.by == finger.body).map(|t| t.pressed()).fold(0.0, |a, b| a + b))
     }
 
     /// Where a finger is on its axis and how fast it goes, seen from the hand, m and m/s.
@@ -131,9 +142,14 @@ impl World {
                     continue;
                 }
                 let force = DRIVEN.0 * (goal - at) + DRIVEN.1 * (speed - going);
+                let mut force = force.clamp(-grip.force, grip.force);
+                if going.abs() > grip.speed && force * going > 0.0 {
+                    // It goes no faster, whatever gives way.
+                    force = -going.signum() * (going.abs() - grip.speed) * body.mass() / STEP;
+                }
                 let axis = *body.rotation() * Vector::from(finger.axis);
                 body.reset_forces(false);
-                body.add_force(axis * force.clamp(-grip.force, grip.force), false);
+                body.add_force(axis * force, false);
                 if let Some(joint) = self.joints.get_mut(joint, false) {
                     joint.data.set_motor(JointAxis::LinX, at + going * STEP, going, COUPLED.0, COUPLED.1);
                 }
@@ -153,6 +169,7 @@ fn sliding(finger: &Finger) -> GenericJoint {
         .contacts_enabled(false)
         .build();
     joint.set_motor_model(JointAxis::LinX, MotorModel::ForceBased);
+    joint.set_limits(JointAxis::LinX, finger.range);
     joint.set_motor(JointAxis::LinX, finger.at, 0.0, COUPLED.0, COUPLED.1);
     joint
 }

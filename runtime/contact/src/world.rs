@@ -208,6 +208,13 @@ impl World {
         self.joints.insert(first, second, joint, true);
     }
 
+    /// A body that sleeps no longer does.
+    pub fn wake(&mut self, id: Id) {
+        if let Some(body) = self.handle(id).and_then(|handle| self.bodies.get_mut(handle)) {
+            body.wake_up(true);
+        }
+    }
+
     /// A loose body moves like that, m/s and rad/s.
     pub fn throw(&mut self, id: Id, speed: [f64; 3], spin: [f64; 3]) {
         if let Some(body) = self.handle(id).and_then(|handle| self.bodies.get_mut(handle)) {

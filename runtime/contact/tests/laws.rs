@@ -163,11 +163,11 @@ fn pinched(mass: f64, force: f64, friction: f64) -> (World, GripId, Id) {
         let pose = Pose::up(0.3).then(origin).then(Pose::at([0.0, at, 0.0]));
         let kind = Kind::Loose(Inertial { placement: inner.then(own.placement), ..own });
         let finger = world.add(&Thing { parts: vec![(inner, &pad)], ..still(pose, kind) });
-        fingers.push(Finger { body: finger, origin, axis: [0.0, 1.0, 0.0], at });
+        fingers.push(Finger { body: finger, origin, axis: [0.0, 1.0, 0.0], at, range: [0.0, 0.04] });
     }
     let block = Shape::Box([0.03, 0.04, 0.05]);
     let item = add(&mut world, &loose(&block, mass, Pose::up(0.19), 1.0));
-    let grip = world.gripper(Grip { hand, fingers: [fingers[0], fingers[1]], force }).expect("it has fingers");
+    let grip = world.gripper(Grip { hand, fingers: [fingers[0], fingers[1]], force, speed: 0.2 }).expect("it has fingers");
     // Held from below until the fingers press.
     let table = Shape::Box([0.2, 0.2, 0.1]);
     let table = world.add(&Thing {

@@ -333,7 +333,7 @@ impl<'m> Sim<'m> {
         let Some(robot) = stage.actor_of(motion.mover()) else { return Moving::AtOnce };
         let planned = performed.map_or(0.0, Performed::duration);
         let lasts = planned + matter.begin(motion, robot, performed, self.engine.time());
-        if lasts > 0.0 { Moving::Lasts(lasts) } else { Moving::AtOnce }
+        if performed.is_some() || lasts > 0.0 { Moving::Lasts(lasts) } else { Moving::AtOnce }
     }
 
     /// What of a motion that is under way has come about otherwise than planned: a status where that is not settled.

@@ -50,7 +50,8 @@ impl<'p> Matter<'p> {
         builder.pairs();
         let fixtures = builder.fixtures();
         let Builder { world, names, unknown, .. } = builder;
-        Ok(Matter {
+        let all: Vec<InstanceId> = loose.keys().copied().collect();
+        let mut matter = Matter {
             scene: stage.scene,
             world,
             names,
@@ -62,7 +63,9 @@ impl<'p> Matter<'p> {
             strays: Vec::new(),
             unknown,
             shown: 0,
-        })
+        };
+        all.into_iter().for_each(|id| matter.settle(id));
+        Ok(matter)
     }
 }
 
@@ -176,18 +179,23 @@ impl Builder<'_, '_> {
         let tool = actor.assembly.owners.get(slides[0].joint.child as usize).copied()?;
         let carrier = links.iter().find(|(link, _)| *link == slides[0].joint.parent as usize)?.1;
         let force = self.stage.scene.get(tool).force.map(|force| force * self.really.grip);
-        let finger = |k: usize| {
-            let Slide { joint, sign, at } = &slides[k];
-            Finger { body: bodies[k], origin: joint.origin, axis: joint.axis.map(|a| a * sign), at: *at }
-        };
-        // A gripper of which it is not said how hard it presses holds whatever it lifts.
-        let force = force.unwrap_or(STRONG);
-        let grip = self.world.gripper(Grip { hand: carrier, fingers: [finger(0), finger(1)], force })?;
         let fingers = actor.fingers.as_ref()?;
         let [closed, open] = fingers.span()?;
         let sign = if open >= closed { 1.0 } else { -1.0 };
+        let range = [closed * sign, open * sign];
+        let finger = |k: usize| {
+            let Slide { joint, sign, at } = &slides[k];
+            let axis = joint.axis.map(|a| a * sign);
+            Finger { body: bodies[k], origin: joint.origin, axis, at: *at, range }
+        };
+        // A gripper of which it is not said how hard it presses holds whatever it lifts.
+        let force = force.unwrap_or(STRONG);
+        let first = fingers.joints.first().and_then(|i| actor.tree.variables().get(*i))?;
+        let speed = first.limits.velocity;
+        let grip = self.world.gripper(Grip { hand: carrier, fingers: [finger(0), finger(1)], force, speed })?;
         let joints = fingers.joints.clone();
-        Some(Hand { grip, fingers: bodies, joints, sign, closed: closed * sign, to: slides[0].at, closing: false, force })
+        let [closed, open] = range;
+        Some(Hand { grip, fingers: bodies, joints, sign, closed, open, to: slides[0].at, goes: None, force })
     }
 
     /// Friction between pairs that the lab gives.

@@ -1,6 +1,6 @@
 //! Whether what a motion was to bring about has come about, and what has gone wrong beside it.
 
-use matterix_contact::Id;
+use matterix_contact::{GRAVITY, Id};
 use matterix_ir::math::acos;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
@@ -15,8 +15,8 @@ const STILL: f64 = 5e-3;
 const LEANS: f64 = 0.35;
 /// The share of their force with which fingers press at least on what they grip.
 const PRESSED: f64 = 0.5;
-/// The share of what fingers press with from which on something else stands in the way of what they hold.
-const BLOCKED: f64 = 0.1;
+/// How many times its weight something presses on a thing at least that stands in its way, and does not only bear it.
+const BLOCKED: f64 = 1.5;
 
 impl Matter<'_> {
     /// Notes what goes wrong now.
@@ -29,7 +29,7 @@ impl Matter<'_> {
             for (robot, machine) in &mut self.machines {
                 let hit = event.robot.is_none_or(|by| by == *robot);
                 if let Some(underway) = machine.underway.as_mut().filter(|_| hit) {
-                    underway.stopped.get_or_insert(event.at - underway.begin);
+                    underway.brakes = true;
                 }
             }
             self.event = Some(event);
@@ -50,7 +50,8 @@ impl Matter<'_> {
             let hand = machine.hand.as_ref()?;
             let between = touches.iter().any(|touch| hand.fingers.contains(&touch.by));
             let against = touches.iter().filter(|touch| !hand.fingers.contains(&touch.by));
-            let against = against.filter(|touch| touch.pressed() > BLOCKED * hand.force);
+            let weight = self.laden(item) * GRAVITY;
+            let against = against.filter(|touch| touch.pressed() > BLOCKED * weight);
             let against = against.max_by(|a, b| a.pressed().total_cmp(&b.pressed()));
             let (failure, text) = match against {
                 Some(touch) => ("jammed", self.jammed(*robot, item, (far, turned), touch)),
@@ -241,12 +242,19 @@ impl Matter<'_> {
             let held = held.filter(|(_, machine)| {
                 machine.hand.as_ref().is_some_and(|hand| self.world.pinch(hand.grip, body).iter().all(|f| *f > 0.0))
             });
-            let held = held.map(|(robot, _)| *robot);
+            // What stands on something is in no hand, though fingers may touch it.
+            let borne = self.world.touches(body).iter().filter(|t| self.robot_of(t.by).is_none()).map(|t| t.press[2]).sum();
+            let weight = self.laden(thing) * GRAVITY;
+            let held = held.map(|(robot, _)| *robot).filter(|_| 2.0 * f64::max(borne, 0.0) < weight);
             let on = if held.is_some() { None } else { self.bearer(body) };
-            for machine in self.machines.values_mut() {
-                if held.is_none() && machine.held.is_some_and(|held| held.item == thing) {
-                    machine.held = None;
-                }
+            if held.is_none() {
+                let hand = |machine: &super::Machine| {
+                    let grips = machine.underway.as_ref().and_then(|underway| underway.grips);
+                    machine.held.is_some_and(|held| held.item == thing) || grips == Some(thing)
+                };
+                let lost: Vec<InstanceId> =
+                    self.machines.iter().filter(|(_, machine)| hand(machine)).map(|(robot, _)| *robot).collect();
+                lost.into_iter().for_each(|robot| self.let_go(robot));
             }
             let (far, turned) = apart(&stage.pose(thing), &at);
             let moved = far > SEEN.0 || turned > SEEN.1;
@@ -257,7 +265,8 @@ impl Matter<'_> {
                     loose.base = on;
                 }
                 if held.is_none() {
-                    self.strays.push(super::Stray { time: self.time(), thing, at });
+                    let touches = self.pressed(body);
+                    self.strays.push(super::Stray { time: self.time(), thing, at: Some(at), touches });
                 }
                 out.push(Found { thing, at, held, on });
             }

@@ -12,21 +12,27 @@ mod story;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_contact::{Id, STEP, World};
+use matterix_contact::{Id, STEP, Touch, World};
 use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Inertial;
 use matterix_ir::scene::{InstanceId, Scene};
 use matterix_motion::placement;
+use serde::Serialize;
 
 use crate::motion::{Actor, Moment, Performed, Stage};
 
-/// Longest time between two moments that are told, s.
+/// Longest time between two moments that are told, s; while fingers move.
 const FRAME: f64 = 0.04;
+const FINE: f64 = 0.005;
+/// Fingers that are slower than this stand, m/s.
+const SLOW: f64 = 1e-3;
 /// How fast fingers go on closing beyond where the thing is taken to be, m/s.
 const CLOSE: f64 = 0.05;
 /// How long fingers press, or what was let go stands, before it is looked at, s.
 const SETTLE: f64 = 0.2;
+/// How fast an arm brakes on its way at most, and at least, as a share of its pace per s.
+const BRAKE: [f64; 2] = [5.0, 0.2];
 /// What falls is waited for so long at most, s.
 const PATIENCE: f64 = 5.0;
 
@@ -45,15 +51,32 @@ impl Default for Really {
     }
 }
 
-/// Where a loose thing was at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A loose thing at a time.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Stray {
     /// s since the run began.
     pub time: f64,
     /// The thing.
     pub thing: InstanceId,
-    /// In the lab.
-    pub at: Pose,
+    /// Where it is in the lab; nothing where a hand has it, which tells that.
+    pub at: Option<Pose>,
+    /// What touches it.
+    pub touches: Vec<Pressed>,
+}
+
+/// What touches a thing, and how hard.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pressed {
+    /// What touches it, in words.
+    pub by: String,
+    /// Where, in the lab, m.
+    pub point: [f64; 3],
+    /// The force across the surface on the thing, N.
+    pub press: [f64; 3],
+    /// The force along the surface on the thing, N.
+    pub rub: [f64; 3],
+    /// The coefficient of friction.
+    pub friction: f64,
 }
 
 /// The bodies of a lab, and what robots do with them. A clone goes on as it does, to the last bit.
@@ -113,8 +136,9 @@ struct Hand {
     /// Where it is closed, and where the fingers are to be, m: more is wider.
     closed: f64,
     to: f64,
-    /// Whether they go on closing until something stops them.
-    closing: bool,
+    open: f64,
+    /// Where they go on by themselves until something stops them.
+    goes: Option<f64>,
     /// What each presses with, N.
     force: f64,
 }
@@ -127,8 +151,12 @@ struct Underway {
     /// What it grips, or lets go.
     grips: Option<InstanceId>,
     frees: Option<(InstanceId, Option<InstanceId>)>,
-    /// When it was stopped, s since it began.
-    stopped: Option<f64>,
+    /// How far it has got on its way, s, how fast it goes on, as a share, and how that changes, per s.
+    way: f64,
+    pace: f64,
+    change: f64,
+    /// Whether it brakes.
+    brakes: bool,
 }
 
 /// A thing between fingers.
@@ -185,7 +213,22 @@ impl Matter<'_> {
 
     /// Whether anything moves, or is about to.
     pub fn is_awake(&self) -> bool {
-        self.event.is_some() || self.machines.values().any(|machine| machine.underway.is_some()) || !self.is_at_rest()
+        let goes = |hand: &Hand| hand.goes.is_some_and(|goal| goal != hand.to);
+        let moves = |machine: &Machine| machine.underway.is_some() || machine.hand.as_ref().is_some_and(goes);
+        self.event.is_some() || self.machines.values().any(moves) || !self.is_at_rest()
+    }
+
+    /// Fingers that have lost what they held open, as wide as they can.
+    fn let_go(&mut self, robot: InstanceId) {
+        let Some(machine) = self.machines.get_mut(&robot) else { return };
+        machine.held = None;
+        if let Some(hand) = machine.hand.as_mut() {
+            // From where they are, not from where they were to close to.
+            hand.to = self.world.opened(hand.grip);
+            hand.goes = Some(hand.open);
+            hand.fingers.iter().for_each(|finger| self.world.wake(*finger));
+            hand.joints.iter().for_each(|i| machine.actor.joints[*i] = hand.open * hand.sign);
+        }
     }
 
     fn is_at_rest(&self) -> bool {
@@ -219,13 +262,18 @@ impl Matter<'_> {
             machine.held = None;
         }
         if let Some(hand) = machine.hand.as_mut() {
-            hand.closing = grips.is_some() || hand.closing && frees.is_none();
-            if frees.is_some() && performed.parts.is_empty() {
-                // Nothing was planned for fingers that let go to another hand.
-                hand.to += ROOM;
+            if grips.is_some() {
+                hand.goes = Some(hand.closed);
+            } else if frees.is_some() {
+                // Nothing is planned for fingers that let go to another hand.
+                hand.goes = performed.parts.is_empty().then(|| (hand.to + ROOM).min(hand.open));
             }
         }
-        machine.underway = Some(Underway { begin: now, performed, grips, frees, stopped: None });
+        let fingers = machine.hand.iter().flat_map(|hand| hand.fingers);
+        let with = [machine.held.map(|held| held.item), grips, frees.map(|(item, _)| item)];
+        let items = with.iter().flatten().filter_map(|item| self.loose.get(item).map(|loose| loose.body));
+        fingers.chain(items).for_each(|body| self.world.wake(body));
+        machine.underway = Some(Underway { begin: now, performed, grips, frees, way: 0.0, pace: 1.0, change: 0.0, brakes: false });
         if grips.is_some() || frees.is_some() { SETTLE } else { 0.0 }
     }
 
@@ -239,11 +287,9 @@ impl Matter<'_> {
 
     /// A robot stops where it is: where its joints are then.
     pub fn stop(&mut self, robot: InstanceId) -> Option<Vec<f64>> {
-        let now = self.time();
         let machine = self.machines.get_mut(&robot)?;
         if let Some(underway) = machine.underway.take() {
-            let since = underway.stopped.unwrap_or(now - underway.begin);
-            underway.performed.bring(&mut machine.actor, since);
+            underway.performed.bring(&mut machine.actor, underway.way);
         }
         Some(machine.actor.joints.clone())
     }
@@ -281,7 +327,11 @@ impl Matter<'_> {
             machine.lead(&mut self.world, next);
         }
         self.world.step();
-        let frame = (self.time() / FRAME).floor() as u64;
+        let moves = |hand: &Hand| self.world.opening(hand.grip).abs() > SLOW;
+        let fingers = self.machines.values().filter_map(|machine| machine.hand.as_ref()).any(moves);
+        let apart = if fingers { FINE } else { FRAME };
+        // On the finer of both, so that one does not stand in for another.
+        let frame = (((self.time() / apart).floor() * apart) / FINE).round() as u64;
         if frame != self.shown {
             self.shown = frame;
             self.show();
@@ -298,10 +348,22 @@ impl Matter<'_> {
         }
         let held: BTreeSet<InstanceId> = self.machines.values().filter_map(|m| m.held.map(|held| held.item)).collect();
         for (id, thing) in &self.loose {
-            if !held.contains(id) && !self.world.is_still(thing.body) {
-                self.strays.push(Stray { time, thing: *id, at: self.world.pose(thing.body) });
+            if !self.world.is_still(thing.body) {
+                let at = (!held.contains(id)).then(|| self.world.pose(thing.body));
+                let touches = self.pressed(thing.body);
+                self.strays.push(Stray { time, thing: *id, at, touches });
             }
         }
+    }
+
+    fn pressed(&self, body: Id) -> Vec<Pressed> {
+        let touches = self.world.touches(body).into_iter();
+        touches
+            .map(|touch| {
+                let Touch { by, point, press, rub, friction, .. } = touch;
+                Pressed { by: self.body(by), point, press, rub, friction }
+            })
+            .collect()
     }
 
     fn moment(&self, robot: InstanceId, machine: &Machine, time: f64) -> Moment {
@@ -316,12 +378,17 @@ impl Matter<'_> {
         let held = machine.held.and_then(|held| Some((held.item, self.world.pose(self.loose.get(&held.item)?.body))));
         let (speeds, accelerations) = (still.clone(), still);
         let mut moment = Moment { time, robot, joints, speeds, accelerations, links, held };
-        if let Some(underway) = machine.underway.as_ref().filter(|underway| underway.stopped.is_none()) {
-            underway.performed.rush(&mut moment, time - underway.begin);
+        if let Some(underway) = &machine.underway {
+            let Underway { way, pace, change, .. } = *underway;
+            underway.performed.rush(&mut moment, way);
+            for (speed, acceleration) in moment.speeds.iter_mut().zip(&mut moment.accelerations) {
+                *acceleration = *acceleration * pace * pace + *speed * change;
+                *speed *= pace;
+            }
         }
         if let Some(hand) = &machine.hand {
             for i in &hand.joints {
-                (moment.speeds[*i], moment.accelerations[*i]) = (0.0, 0.0);
+                (moment.speeds[*i], moment.accelerations[*i]) = (self.world.opening(hand.grip) * hand.sign, 0.0);
             }
         }
         moment
@@ -355,6 +422,44 @@ impl Matter<'_> {
 /// How far fingers open that let go to another hand, m.
 const ROOM: f64 = 0.008;
 
+impl Underway {
+    /// Goes on to a time, s: at its pace, or braking on its way as fast as the joints leave it.
+    fn go_on(&mut self, actor: &Actor, time: f64) {
+        if !self.brakes {
+            self.way = time - self.begin;
+            return;
+        }
+        if self.pace <= 0.0 {
+            (self.pace, self.change) = (0.0, 0.0);
+            return;
+        }
+        let still = vec![0.0; actor.joints.len()];
+        let mut rates = Moment {
+            time,
+            robot: self.performed.robot,
+            joints: Vec::new(),
+            speeds: still.clone(),
+            accelerations: still,
+            links: Vec::new(),
+            held: None,
+        };
+        self.performed.rush(&mut rates, self.way);
+        let mut change = -BRAKE[0];
+        for ((speed, acceleration), variable) in rates.speeds.iter().zip(&rates.accelerations).zip(actor.tree.variables()) {
+            let Some(limit) = variable.limits.acceleration.filter(|_| *speed != 0.0) else { continue };
+            // What is left against the way it goes.
+            let own = acceleration * self.pace * self.pace * speed.signum();
+            change = change.max(-(BRAKED * limit + own).max(0.0) / speed.abs());
+        }
+        self.change = change.min(-BRAKE[1]).max(-self.pace / STEP);
+        self.way += self.pace * STEP + self.change * STEP * STEP / 2.0;
+        self.pace += self.change * STEP;
+    }
+}
+
+/// What share of its acceleration a joint brakes with at most.
+const BRAKED: f64 = 0.95;
+
 impl Machine {
     fn link(&self, link: usize) -> Pose {
         let poses = self.actor.tree.poses(&self.actor.joints);
@@ -363,9 +468,9 @@ impl Machine {
 
     /// Leads links and fingers to where they are at a time, s.
     fn lead(&mut self, world: &mut World, time: f64) {
-        if let Some(underway) = &self.underway {
-            let since = underway.stopped.unwrap_or(time - underway.begin);
-            underway.performed.bring(&mut self.actor, since);
+        if let Some(underway) = &mut self.underway {
+            underway.go_on(&self.actor, time);
+            underway.performed.bring(&mut self.actor, underway.way);
             let poses = self.actor.tree.poses(&self.actor.joints);
             for (link, body) in &self.links {
                 if let Some(pose) = poses.get(*link) {
@@ -375,7 +480,7 @@ impl Machine {
         }
         let Some(hand) = self.hand.as_mut() else { return };
         let mut speed = 0.0;
-        let planned = self.underway.as_ref().filter(|underway| underway.stopped.is_none()).and_then(|underway| {
+        let planned = self.underway.as_ref().filter(|underway| !underway.brakes).and_then(|underway| {
             let first = hand.joints.first()?;
             let since = time - underway.begin;
             let at = underway.performed.at(&[*first], since)?.first().copied()?;
@@ -386,11 +491,13 @@ impl Machine {
                 speed = (at - hand.to) / STEP;
                 hand.to = at;
             }
-            None if hand.closing => {
-                hand.to = (hand.to - CLOSE * STEP).max(hand.closed);
-                speed = -CLOSE;
+            None => {
+                let way = hand.goes.map_or(0.0, |goal| goal - hand.to);
+                if way != 0.0 {
+                    hand.to += way.clamp(-CLOSE * STEP, CLOSE * STEP);
+                    speed = CLOSE.copysign(way);
+                }
             }
-            None => {}
         }
         world.close(hand.grip, hand.to, speed);
     }

@@ -11,7 +11,7 @@ impl Matter<'_> {
     }
 
     /// A body in words: a thing, a link of a robot, the floor.
-    fn body(&self, id: Id) -> String {
+    pub(super) fn body(&self, id: Id) -> String {
         match self.names.get(id.0 as usize) {
             Some((Some(instance), Some(link))) => format!("`{link}` of `{}`", self.called(*instance)),
             Some((Some(instance), None)) => format!("`{}`", self.called(*instance)),
@@ -38,7 +38,7 @@ impl Matter<'_> {
     }
 
     /// The mass of a thing with what stands on it, kg.
-    fn laden(&self, item: InstanceId) -> f64 {
+    pub(super) fn laden(&self, item: InstanceId) -> f64 {
         let own = self.loose.get(&item).map_or(0.0, |loose| loose.now.mass);
         let upon = self.loose.iter().filter(|(id, loose)| **id != item && loose.base == Some(item));
         own + upon.map(|(_, loose)| loose.now.mass).sum::<f64>()
@@ -75,7 +75,7 @@ impl Matter<'_> {
             .filter(|touch| touch.pressed() > 0.05 * machine.force)
             .map(|touch| self.body(touch.by))
             .collect();
-        let [one, other] = pinch;
+        let [one, other] = pinch.map(|force| force.max(0.0) + 0.0);
         let mut text = format!(
             "the fingers of `{hand}` press on `{name}` with {one:.1} N and {other:.1} N of {:.1} N each",
             machine.force

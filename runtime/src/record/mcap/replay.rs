@@ -96,9 +96,9 @@ impl<'p> Replay<'p> {
 
     /// A loose thing is somewhere else from now on; what it is, with all that goes along.
     pub(super) fn strayed(&mut self, stray: &Stray) -> Vec<(InstanceId, Pose)> {
-        let id = stray.thing;
+        let (id, Some(at)) = (stray.thing, stray.at) else { return Vec::new() };
         let on = self.stage.stand_of(id);
-        self.stage.lies(id, stray.at, on);
+        self.stage.lies(id, at, on);
         self.freed.insert(id);
         let mut going = vec![id];
         let all = (0..self.stage.scene.instances.len() as u32).map(InstanceId);
