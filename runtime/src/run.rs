@@ -91,7 +91,9 @@ pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) 
         Err(fault) => return refused(program, fault),
     };
     match options.fidelity {
-        Fidelity::Process | Fidelity::Motion | Fidelity::Contact => run_ready(program, &Prepared::new(program), params, options, out),
+        Fidelity::Process | Fidelity::Motion | Fidelity::Contact => {
+            run_ready(program, &Prepared::new(program), params, options, out)
+        }
         Fidelity::Dry => {
             let mut dry = Dry::new(&program.model, &program.plan, params.clone());
             let execution = exec::execute(&program.plan, &program.scene, &mut dry, options.limits, out);
@@ -212,7 +214,8 @@ fn twin<'p>(
     match Stage::new(program) {
         Ok(stage) if options.fidelity == Fidelity::Contact => {
             let matter = Matter::new(&options.unseen.in_stage(&stage), options.really);
-            let matter = matter.map_err(|why| Box::new(refused(program, Fault::new(codes::NO_CONTACT_MODEL, 0.0, why))))?;
+            let matter =
+                matter.map_err(|why| Box::new(refused(program, Fault::new(codes::NO_CONTACT_MODEL, 0.0, why))))?;
             let moves = Moves { robots: true, beside: runs_beside(&program.plan) };
             Ok(sim.with_stage(stage, moves, out).with_matter(matter))
         }

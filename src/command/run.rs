@@ -8,7 +8,7 @@ use matterix_runtime::exec::Turn;
 use matterix_runtime::motion::{Unseen, perturb};
 use matterix_runtime::record::Folder;
 
-use crate::args::{Color, RunFidelity, RunArgs, RunFormat};
+use crate::args::{Color, RunArgs, RunFidelity, RunFormat};
 use crate::cache;
 use crate::pipeline::{self, Choices, Input, Keep, Search};
 use crate::progress::{Kind, Progress};

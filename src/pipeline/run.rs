@@ -7,10 +7,10 @@ use std::sync::atomic::AtomicBool;
 use matterix_ir::plan::{Condition, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
+use matterix_runtime::contact::{Really, Stray};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
-use matterix_runtime::contact::{Really, Stray};
 use matterix_runtime::motion::{Burden, Moment, Moved, Unseen};
 use matterix_runtime::process::{Engine, Observer, Options};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo, Sampler};

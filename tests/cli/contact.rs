@@ -84,7 +84,10 @@ fn fingers_that_close_beside_a_thing_miss_it() {
     assert_eq!(ended.code, 0, "a small error is taken: {}", ended.err);
     let met = (1..=8).map(|seed: u32| run(&dir, &["--unseen", "22mm", "--seed", &seed.to_string()]));
     let said: Vec<String> = met.map(|ended| flat(&ended.err)).collect();
-    assert!(said.iter().any(|said| said.contains("failed with `missed`: the fingers of `panda` press on `vial`")), "{said:#?}");
+    assert!(
+        said.iter().any(|said| said.contains("failed with `missed`: the fingers of `panda` press on `vial`")),
+        "{said:#?}"
+    );
 }
 
 #[test]

@@ -21,8 +21,7 @@ fn beaker() -> Shape {
 fn world(count: u32) -> (World, Vec<Id>) {
     let shapes = [beaker(), Shape::Box([0.06, 0.04, 0.03])];
     let bodies = shapes.each_ref().map(|shape| Body::of_shapes([(shape, Pose::IDENTITY)]).expect("it has a form"));
-    let inertials =
-        shapes.each_ref().map(|shape| of_shapes(0.1, [(shape, Pose::IDENTITY)]).expect("it has a form"));
+    let inertials = shapes.each_ref().map(|shape| of_shapes(0.1, [(shape, Pose::IDENTITY)]).expect("it has a form"));
     let mut world = World::new();
     world.floor(0.4);
     let side = f64::from(count).sqrt().ceil() as u32;
@@ -31,7 +30,7 @@ fn world(count: u32) -> (World, Vec<Id>) {
         let at = Pose::at([0.1 * f64::from(k % side), 0.1 * f64::from(k / side), 0.002]);
         let parts = vec![(Pose::IDENTITY, &bodies[kind])];
         let kind = Kind::Loose(inertials[kind]);
-        world.add(&Thing { parts, at, kind, friction: 0.4, bounce: 0.0, robot: false })
+        world.add(&Thing { parts, outside: Vec::new(), at, kind, friction: 0.4, bounce: 0.0, robot: false })
     });
     let ids = ids.collect();
     (world, ids)

@@ -25,7 +25,7 @@ pub(crate) fn fine(at: Pose, shape: &SharedShape, skin: f64) -> Vec<(Pose, Share
 }
 
 /// A convex part, smaller by so much on each of the six sides of the box around it, m; none where it is something else, or thinner than that.
-fn inset(shape: &SharedShape, skin: f64) -> Option<SharedShape> {
+pub(crate) fn inset(shape: &SharedShape, skin: f64) -> Option<SharedShape> {
     let less = |length: f64| (length > 2.0 * skin).then_some(length - skin);
     if let Some(cuboid) = shape.as_cuboid() {
         let half = cuboid.half_extents;

@@ -7,19 +7,22 @@
 use matterix_ir::pose::Pose;
 use matterix_solids::isometry;
 use rapier3d_f64::prelude::{
-    GenericJoint, GenericJointBuilder, ImpulseJointHandle, JointAxesMask, JointAxis, MassProperties, MotorModel,
-    Rotation, Vector,
+    AngVector, GenericJoint, GenericJointBuilder, ImpulseJointHandle, JointAxesMask, JointAxis, MassProperties,
+    MotorModel, Rotation, Vector,
 };
 
 use crate::world::{STEP, World};
 use crate::{Id, thing};
 
 /// How stiffly the fingers are coupled, N/m, and what brings them to rest without swinging, N s/m.
-const COUPLED: (f64, f64) = (5e4, 150.0);
+const COUPLED: (f64, f64) = (1e4, 30.0);
 /// How stiffly the motor goes where the fingers are to be, N/m and N s/m.
-const DRIVEN: (f64, f64) = (1e4, 150.0);
+const DRIVEN: (f64, f64) = (1e4, 60.0);
 /// What a motor and its gears add to the mass of each finger along its way, kg: as armatures of small grippers are described for simulators.
-const ARMATURE: f64 = 0.5;
+const ARMATURE: f64 = 0.1;
+
+/// How far a finger may have turned from where its hand has it before it is set right, rad.
+const ASTRAY: f64 = 1e-7;
 
 /// A gripper of a world, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,13 +75,10 @@ impl World {
             if let Some(body) = self.bodies.get_mut(body) {
                 // Both are carried by the rack that couples them.
                 body.set_gravity_scale(0.0, false);
+                body.recompute_mass_properties_from_colliders(&self.colliders);
                 let own = body.mass_properties().local_mprops;
-                let moved = MassProperties::with_principal_inertia_frame(
-                    own.local_com,
-                    own.mass() + ARMATURE,
-                    own.principal_inertia() * ((own.mass() + ARMATURE) / own.mass().max(f64::MIN_POSITIVE)),
-                    own.principal_inertia_local_frame,
-                );
+                // It turns with its hand, whatever presses on it: no moments of its own.
+                let moved = MassProperties::new(own.local_com, own.mass() + ARMATURE, AngVector::ZERO);
                 body.set_additional_mass_properties(moved, false);
                 body.recompute_mass_properties_from_colliders(&self.colliders);
             }
@@ -113,7 +113,10 @@ impl World {
     pub fn pinch(&self, grip: GripId, on: Id) -> [f64; 2] {
         let Some(joined) = self.grips.get(grip.0) else { return [0.0; 2] };
         let touches = self.touches(on);
-        joined.grip.fingers.map(|finger| touches.iter().filter(|t| t.by == finger.body).map(|t| t.pressed()).fold(0.0, |a, b| a + b))
+        joined
+            .grip
+            .fingers
+            .map(|finger| touches.iter().filter(|t| t.by == finger.body).map(|t| t.pressed()).fold(0.0, |a, b| a + b))
     }
 
     /// Where a finger is on its axis and how fast it goes, seen from the hand, m and m/s.
@@ -134,6 +137,9 @@ impl World {
             let Joined { grip, joints, goal: [goal, speed] } = self.grips[index];
             let slid = grip.fingers.map(|finger| self.slid(&grip, &finger));
             let (at, going) = ((slid[0][0] + slid[1][0]) / 2.0, (slid[0][1] + slid[1][1]) / 2.0);
+            let Some(hand) = self.handle(grip.hand).and_then(|handle| self.bodies.get(handle)) else { continue };
+            let (turned, then) = (hand.position().rotation, hand.next_position().rotation);
+            let spin = (then * turned.inverse()).to_scaled_axis() / STEP;
             for (finger, joint) in grip.fingers.iter().zip(joints) {
                 let Some(body) = self.handle(finger.body).and_then(|handle| self.bodies.get_mut(handle)) else {
                     continue;
@@ -141,9 +147,14 @@ impl World {
                 if body.is_sleeping() {
                     continue;
                 }
+                let own = turned * isometry(&finger.origin).rotation;
+                if body.rotation().angle_between(own) > ASTRAY {
+                    body.set_rotation(own, false);
+                }
+                body.set_angvel(spin, false);
                 let force = DRIVEN.0 * (goal - at) + DRIVEN.1 * (speed - going);
                 let mut force = force.clamp(-grip.force, grip.force);
-                if going.abs() > grip.speed && force * going > 0.0 {
+                if going.abs() > grip.speed {
                     // It goes no faster, whatever gives way.
                     force = -going.signum() * (going.abs() - grip.speed) * body.mass() / STEP;
                 }

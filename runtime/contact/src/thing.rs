@@ -25,6 +25,9 @@ pub enum Kind {
 pub struct Thing<'a> {
     /// Its solid parts, each with its place on it.
     pub parts: Vec<(Pose, &'a Body)>,
+    /// How robots feel it from outside, where that is simpler: they touch this instead. Walls made of many pieces have inner sides, which a finger
+    /// that presses on them would feel.
+    pub outside: Vec<(Pose, &'a Body)>,
     /// Where it is.
     pub at: Pose,
     /// What moves it.

@@ -39,10 +39,10 @@ impl Touch {
 impl World {
     /// All that touches a body with some force, in the order of numbers.
     pub fn touches(&self, of: Id) -> Vec<Touch> {
-        let Some(collider) = self.collider(of) else { return Vec::new() };
         let mut out = Vec::new();
-        for pair in self.narrow.contact_pairs_with(collider) {
-            let first = pair.collider1 == collider;
+        let own = self.colliders_of(of);
+        for pair in own.iter().flat_map(|collider| self.narrow.contact_pairs_with(*collider)) {
+            let first = own.contains(&pair.collider1);
             let other = if first { pair.collider2 } else { pair.collider1 };
             let Some(by) = self.colliders.get(other).map(|c| Id(c.user_data as u32)) else { continue };
             let sign = if first { -1.0 } else { 1.0 };

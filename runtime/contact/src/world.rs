@@ -10,7 +10,7 @@ use rapier3d_f64::prelude::{
     RigidBodyBuilder, RigidBodyHandle, RigidBodySet, SharedShape, SoftBodySet, SpringCoefficients, Vector,
 };
 
-use crate::facets::fine;
+use crate::facets::{fine, inset};
 use crate::friction::Pairs;
 use crate::grip::Joined;
 use crate::thing::{Id, Kind, Thing, mass};
@@ -20,12 +20,18 @@ pub const STEP: f64 = 1e-3;
 /// Standard gravity, m/s2.
 pub const GRAVITY: f64 = 9.80665;
 
+/// What is told apart where it is asked what touches what: things, robots, and things as robots feel them.
+const THINGS: Group = Group::GROUP_1;
+const ROBOTS: Group = Group::GROUP_2;
+const FELT: Group = Group::GROUP_3;
+
 /// The size of what is in a lab, by which the engine takes its margins, m.
 const UNIT: f64 = 0.1;
 /// How often forces are solved in a step.
-const ROUNDS: usize = 4;
-/// How stiff touch is: frequency, Hz, and damping ratio.
-const TOUCH: (f64, f64) = (250.0, 10.0);
+const ROUNDS: usize = 8;
+/// How stiff touch is, and touch of what does not move: frequency, Hz, and damping ratio.
+const TOUCH: (f64, f64) = (1000.0, 8.0);
+const STAND: (f64, f64) = (1000.0, 10.0);
 /// What moves slower than this for half a second falls asleep, m/s.
 const STILL: f64 = 1e-3;
 /// Bodies are made of a core and a skin of this thickness, m. What rests has its skins in touch and its cores apart, where distances are exact: of faces that
@@ -48,7 +54,7 @@ pub struct World {
     multibodies: MultibodyJointSet,
     soft: SoftBodySet,
     fast: CCDSolver,
-    handles: Vec<(RigidBodyHandle, Option<ColliderHandle>)>,
+    handles: Vec<(RigidBodyHandle, Vec<ColliderHandle>)>,
     pairs: Pairs,
     pub(crate) grips: Vec<Joined>,
     steps: u64,
@@ -72,14 +78,14 @@ impl Default for World {
 impl World {
     /// Nothing yet.
     pub fn new() -> Self {
-        let soft = |frequency| SpringCoefficients { natural_frequency: frequency, damping_ratio: TOUCH.1 };
+        let soft = |(natural_frequency, damping_ratio)| SpringCoefficients { natural_frequency, damping_ratio };
         let parameters = IntegrationParameters {
             dt: STEP,
             length_unit: UNIT,
             normalized_prediction_distance: NEAR / UNIT,
             num_solver_iterations: ROUNDS,
-            contact_softness: soft(TOUCH.0),
-            static_contact_softness: soft(2.0 * TOUCH.0),
+            contact_softness: soft(TOUCH),
+            static_contact_softness: soft(STAND),
             contact_recycling: false,
             contact_clustering: false,
             warmstart_joints: true,
@@ -116,17 +122,24 @@ impl World {
             0 => None,
             _ => Some(SharedShape::compound(shapes)),
         };
-        self.insert(thing, shape)
+        let mut felt = Vec::new();
+        for (at, body) in &thing.outside {
+            let at = isometry(at);
+            felt.extend(body.pieces().map(|(inner, shape)| (at * inner, inset(shape, SKIN).unwrap_or(shape.clone()))));
+        }
+        let felt = (!felt.is_empty()).then(|| SharedShape::compound(felt));
+        self.insert(thing, shape, felt)
     }
 
     /// The floor: all that is below z = 0.
     pub fn floor(&mut self, friction: f64) -> Id {
+        let (parts, outside) = (Vec::new(), Vec::new());
         let thing =
-            Thing { parts: Vec::new(), at: Pose::up(-SKIN), kind: Kind::Fixed, friction, bounce: 0.0, robot: false };
-        self.insert(&thing, Some(SharedShape::halfspace(Vector::Z)))
+            Thing { parts, outside, at: Pose::up(-SKIN), kind: Kind::Fixed, friction, bounce: 0.0, robot: false };
+        self.insert(&thing, Some(SharedShape::halfspace(Vector::Z)), None)
     }
 
-    pub(crate) fn insert(&mut self, thing: &Thing<'_>, shape: Option<SharedShape>) -> Id {
+    fn insert(&mut self, thing: &Thing<'_>, shape: Option<SharedShape>, felt: Option<SharedShape>) -> Id {
         let id = Id(self.handles.len() as u32);
         let at = isometry(&thing.at);
         let builder = match &thing.kind {
@@ -137,26 +150,24 @@ impl World {
         let mut body = builder.pose(at).gyroscopic_forces_enabled(true).build();
         body.activation_mut().normalized_linear_threshold = STILL / UNIT;
         let body = self.bodies.insert(body);
-        let collider = shape.map(|shape| {
-            let groups = match thing.robot {
-                true => InteractionGroups::new(Group::GROUP_2, Group::GROUP_1, InteractionTestMode::And),
-                false => {
-                    InteractionGroups::new(Group::GROUP_1, Group::GROUP_1 | Group::GROUP_2, InteractionTestMode::And)
-                }
-            };
-            let collider = ColliderBuilder::new(shape)
+        let others = if felt.is_some() { THINGS } else { THINGS | ROBOTS };
+        let groups = if thing.robot { (ROBOTS, THINGS | FELT) } else { (THINGS, others) };
+        let all = [(shape, groups), (felt, (FELT, ROBOTS))];
+        let colliders = all.into_iter().filter_map(|(shape, (own, others))| {
+            let collider = ColliderBuilder::new(shape?)
                 .density(0.0)
                 .contact_skin(SKIN)
                 .friction(thing.friction)
                 .friction_combine_rule(CoefficientCombineRule::Min)
                 .restitution(thing.bounce)
                 .restitution_combine_rule(CoefficientCombineRule::Min)
-                .collision_groups(groups)
+                .collision_groups(InteractionGroups::new(own, others, InteractionTestMode::And))
                 .user_data(u128::from(id.0))
                 .build();
-            self.colliders.insert_with_parent(collider, body, &mut self.bodies)
+            Some(self.colliders.insert_with_parent(collider, body, &mut self.bodies))
         });
-        self.handles.push((body, collider));
+        let colliders = colliders.collect();
+        self.handles.push((body, colliders));
         id
     }
 
@@ -164,8 +175,10 @@ impl World {
     pub fn between(&mut self, a: Id, b: Id, friction: f64) {
         self.pairs.set(a, b, friction);
         for id in [a, b].into_iter().filter(|id| self.pairs.has(*id)) {
-            if let Some(collider) = self.collider(id).and_then(|handle| self.colliders.get_mut(handle)) {
-                collider.set_active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+            for handle in self.colliders_of(id).to_vec() {
+                if let Some(collider) = self.colliders.get_mut(handle) {
+                    collider.set_active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+                }
             }
         }
     }
@@ -288,7 +301,7 @@ impl World {
         self.handles.get(id.0 as usize).map(|handles| handles.0)
     }
 
-    pub(crate) fn collider(&self, id: Id) -> Option<ColliderHandle> {
-        self.handles.get(id.0 as usize).and_then(|handles| handles.1)
+    pub(crate) fn colliders_of(&self, id: Id) -> &[ColliderHandle] {
+        self.handles.get(id.0 as usize).map_or(&[], |handles| &handles.1)
     }
 }

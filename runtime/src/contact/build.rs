@@ -1,5 +1,6 @@
 //! A world of bodies from a lab: what stands fixed, what robots are made of, what is loose.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_contact::{Finger, Grip, GripId, Id, Kind, Thing, World};
@@ -15,8 +16,7 @@ use crate::motion::{Actor, Carried, Stage};
 /// What is not known to slide does not.
 const STICKS: f64 = 10.0;
 /// The mass, kg, and its moments, kg m2, of a finger whose description names none: small beside what moves it.
-const FINGER: Inertial =
-    Inertial { mass: 0.03, placement: Pose::IDENTITY, inertia: [1e-5, 0.0, 0.0, 1e-5, 0.0, 1e-5] };
+const FINGER: Inertial = Inertial { mass: 0.03, placement: Pose::IDENTITY, inertia: [1e-5, 0.0, 0.0, 1e-5, 0.0, 1e-5] };
 
 struct Builder<'s, 'p> {
     stage: &'s Stage<'p>,
@@ -90,23 +90,32 @@ impl Builder<'_, '_> {
     /// Things that stand, loose or not.
     fn things(&mut self) -> BTreeMap<InstanceId, Loose> {
         let stage = self.stage;
-        let mut parts: BTreeMap<InstanceId, Vec<(InstanceId, &Body)>> = BTreeMap::new();
+        let mut parts: BTreeMap<InstanceId, Vec<(InstanceId, Cow<'_, Body>)>> = BTreeMap::new();
         for index in 0..stage.scene.instances.len() as u32 {
             let id = InstanceId(index);
             let Some(body) = stage.bodies().get(index as usize).and_then(Option::as_ref) else { continue };
             if stage.actor_of(id).is_some() || stage.is_inside_a_shape(id) {
                 continue;
             }
-            parts.entry(stage.whole(id)).or_default().push((id, body));
+            parts
+                .entry(stage.whole(id))
+                .or_default()
+                .push((id, roomy(stage, id).map_or(Cow::Borrowed(body), Cow::Owned)));
         }
         let mut loose = BTreeMap::new();
         for (whole, parts) in parts {
             let (at, friction) = (stage.pose(whole), self.friction(whole));
             let inertial = stage.scene.get(whole).inertial.filter(|_| is_loose(stage, whole));
             let back = at.inverse();
-            let parts = parts.iter().map(|(id, body)| (back.then(stage.pose(*id)), *body)).collect();
+            let felt: Vec<InstanceId> = parts.iter().map(|(id, _)| *id).collect();
+            let parts = parts.iter().map(|(id, body)| (back.then(stage.pose(*id)), &**body)).collect();
             let kind = inertial.map_or(Kind::Fixed, Kind::Loose);
-            let id = self.world.add(&Thing { parts, at, kind, friction, bounce: 0.0, robot: false });
+            let felt: Vec<(Pose, Option<Body>)> = match inertial {
+                Some(_) => felt.iter().map(|id| (back.then(stage.pose(*id)), outside(stage, *id))).collect(),
+                None => Vec::new(),
+            };
+            let outside = felt.iter().filter_map(|(at, body)| Some((*at, body.as_ref()?))).collect();
+            let id = self.world.add(&Thing { parts, outside, at, kind, friction, bounce: 0.0, robot: false });
             self.name(id, Some(whole), None);
             if let Some(inertial) = inertial {
                 loose.insert(whole, Loose { body: id, empty: inertial, now: inertial, rests: at, base: None });
@@ -129,8 +138,15 @@ impl Builder<'_, '_> {
             for (link, (at, body)) in fixture.links().into_iter().zip(Body::of_links(robot)).enumerate() {
                 let Some(body) = body else { continue };
                 let parts = vec![(Pose::IDENTITY, &body)];
-                let thing =
-                    Thing { parts, at: base.then(at), kind: Kind::Led, friction, bounce: 0.0, robot: false };
+                let thing = Thing {
+                    parts,
+                    outside: Vec::new(),
+                    at: base.then(at),
+                    kind: Kind::Led,
+                    friction,
+                    bounce: 0.0,
+                    robot: false,
+                };
                 let body = self.world.add(&thing);
                 self.name(body, Some(id), robot.links.get(link).map(|l| l.name.clone()));
                 links.push((link, body));
@@ -161,7 +177,8 @@ impl Builder<'_, '_> {
                 None => Kind::Led,
             };
             let friction = self.friction(owner);
-            let id = self.world.add(&Thing { parts, at, kind, friction, bounce: 0.0, robot: true });
+            let id =
+                self.world.add(&Thing { parts, outside: Vec::new(), at, kind, friction, bounce: 0.0, robot: true });
             self.name(id, Some(owner), whole.links.get(link).map(|l| l.name.clone()));
             match slide {
                 Some(slide) => fingers.push((id, slide)),
@@ -203,7 +220,8 @@ impl Builder<'_, '_> {
         for friction in &self.stage.scene.frictions {
             let [a, b] = friction.between.map(|id| self.ids.get(&id).cloned().unwrap_or_default());
             for one in &a {
-                b.iter().for_each(|other| self.world.between(*one, *other, friction.coefficient * self.really.friction));
+                b.iter()
+                    .for_each(|other| self.world.between(*one, *other, friction.coefficient * self.really.friction));
             }
         }
     }
@@ -256,12 +274,31 @@ fn slides(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Result<Option<
     }
 }
 
+/// A thing as fingers feel it.
+fn outside(stage: &Stage<'_>, id: InstanceId) -> Option<Body> {
+    let instance = stage.scene.get(id);
+    Body::outside(instance.hull().chain(instance.more()))
+}
+
+/// The body of a thing with holes, none of them narrower than it is.
+fn roomy(stage: &Stage<'_>, id: InstanceId) -> Option<Body> {
+    let instance = stage.scene.get(id);
+    let rooms = stage.scene.rooms(id);
+    if rooms.is_empty() || !instance.collision.is_empty() {
+        return None;
+    }
+    Body::with_wide_rooms(instance.solid(), &instance.solids, &rooms)
+}
+
 /// Whether a thing is moved by forces: it can be gripped, is a part of nothing and stands or is held somewhere.
 fn is_loose(stage: &Stage<'_>, id: InstanceId) -> bool {
     let instance = stage.scene.get(id);
     let can_be_gripped = instance.frames.iter().any(|f| f.name == frame::GRASP);
     let carried = stage.carried.get(id.0 as usize);
-    can_be_gripped && instance.owner.is_none() && instance.articulation.is_none() && !matches!(carried, Some(Carried::Held(..)) | None)
+    can_be_gripped
+        && instance.owner.is_none()
+        && instance.articulation.is_none()
+        && !matches!(carried, Some(Carried::Held(..)) | None)
 }
 
 /// The gripper's body by which one is told which it is.

@@ -53,6 +53,5 @@ fn level(inside: &[[f64; 2]], volume: f64) -> Option<(f64, f64, f64)> {
     }
     let filled = volume - left.max(0.0);
     let height = top - low;
-    (filled > 0.0 && height > 0.0)
-        .then(|| (moment / filled, height, (filled / (std::f64::consts::PI * height)).sqrt()))
+    (filled > 0.0 && height > 0.0).then(|| (moment / filled, height, (filled / (std::f64::consts::PI * height)).sqrt()))
 }

@@ -209,7 +209,13 @@ impl Matter<'_> {
     }
 
     /// Whether a thing that was let go stands where it was to.
-    fn freed(&mut self, robot: InstanceId, item: InstanceId, on: Option<InstanceId>, stage: &Stage<'_>) -> Option<Verdict> {
+    fn freed(
+        &mut self,
+        robot: InstanceId,
+        item: InstanceId,
+        on: Option<InstanceId>,
+        stage: &Stage<'_>,
+    ) -> Option<Verdict> {
         let loose = *self.loose.get(&item)?;
         let taken = self.machines.values().any(|machine| machine.held.is_some_and(|held| held.item == item));
         if taken {
@@ -243,7 +249,8 @@ impl Matter<'_> {
                 machine.hand.as_ref().is_some_and(|hand| self.world.pinch(hand.grip, body).iter().all(|f| *f > 0.0))
             });
             // What stands on something is in no hand, though fingers may touch it.
-            let borne = self.world.touches(body).iter().filter(|t| self.robot_of(t.by).is_none()).map(|t| t.press[2]).sum();
+            let borne =
+                self.world.touches(body).iter().filter(|t| self.robot_of(t.by).is_none()).map(|t| t.press[2]).sum();
             let weight = self.laden(thing) * GRAVITY;
             let held = held.map(|(robot, _)| *robot).filter(|_| 2.0 * f64::max(borne, 0.0) < weight);
             let on = if held.is_some() { None } else { self.bearer(body) };
@@ -287,7 +294,7 @@ impl Matter<'_> {
     /// What presses a body up most.
     pub(super) fn bearer(&self, body: Id) -> Option<InstanceId> {
         let touches = self.world.touches(body);
-        let below = touches.iter().filter(|touch| touch.press[2] > 0.0);
+        let below = touches.iter().filter(|touch| touch.press[2] > 0.0 && self.robot_of(touch.by).is_none());
         let most = below.max_by(|a, b| a.press[2].total_cmp(&b.press[2]))?;
         self.names.get(most.by.0 as usize)?.0
     }

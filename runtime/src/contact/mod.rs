@@ -27,6 +27,8 @@ const FRAME: f64 = 0.04;
 const FINE: f64 = 0.005;
 /// Fingers that are slower than this stand, m/s.
 const SLOW: f64 = 1e-3;
+/// How far beyond where they are closed fingers are led, m: its motor presses with all its force then, whatever is between them.
+const AHEAD: f64 = 0.03;
 /// How fast fingers go on closing beyond where the thing is taken to be, m/s.
 const CLOSE: f64 = 0.05;
 /// How long fingers press, or what was let go stands, before it is looked at, s.
@@ -224,7 +226,7 @@ impl Matter<'_> {
         machine.held = None;
         if let Some(hand) = machine.hand.as_mut() {
             // From where they are, not from where they were to close to.
-            hand.to = self.world.opened(hand.grip);
+            hand.to = self.world.opened(hand.grip).clamp(hand.closed, hand.open);
             hand.goes = Some(hand.open);
             hand.fingers.iter().for_each(|finger| self.world.wake(*finger));
             hand.joints.iter().for_each(|i| machine.actor.joints[*i] = hand.open * hand.sign);
@@ -263,7 +265,7 @@ impl Matter<'_> {
         }
         if let Some(hand) = machine.hand.as_mut() {
             if grips.is_some() {
-                hand.goes = Some(hand.closed);
+                hand.goes = Some(hand.closed - AHEAD);
             } else if frees.is_some() {
                 // Nothing is planned for fingers that let go to another hand.
                 hand.goes = performed.parts.is_empty().then(|| (hand.to + ROOM).min(hand.open));
@@ -273,7 +275,8 @@ impl Matter<'_> {
         let with = [machine.held.map(|held| held.item), grips, frees.map(|(item, _)| item)];
         let items = with.iter().flatten().filter_map(|item| self.loose.get(item).map(|loose| loose.body));
         fingers.chain(items).for_each(|body| self.world.wake(body));
-        machine.underway = Some(Underway { begin: now, performed, grips, frees, way: 0.0, pace: 1.0, change: 0.0, brakes: false });
+        machine.underway =
+            Some(Underway { begin: now, performed, grips, frees, way: 0.0, pace: 1.0, change: 0.0, brakes: false });
         if grips.is_some() || frees.is_some() { SETTLE } else { 0.0 }
     }
 
@@ -369,7 +372,8 @@ impl Matter<'_> {
     fn moment(&self, robot: InstanceId, machine: &Machine, time: f64) -> Moment {
         let mut joints = machine.actor.joints.clone();
         if let Some(hand) = &machine.hand {
-            let now = self.world.opened(hand.grip) * hand.sign;
+            // What stops it at its ends gives by some hundredths of a millimetre.
+            let now = self.world.opened(hand.grip).clamp(hand.closed, hand.open) * hand.sign;
             hand.joints.iter().for_each(|i| joints[*i] = now);
         }
         let poses = machine.actor.tree.poses(&joints);
@@ -445,7 +449,9 @@ impl Underway {
         };
         self.performed.rush(&mut rates, self.way);
         let mut change = -BRAKE[0];
-        for ((speed, acceleration), variable) in rates.speeds.iter().zip(&rates.accelerations).zip(actor.tree.variables()) {
+        for ((speed, acceleration), variable) in
+            rates.speeds.iter().zip(&rates.accelerations).zip(actor.tree.variables())
+        {
             let Some(limit) = variable.limits.acceleration.filter(|_| *speed != 0.0) else { continue };
             // What is left against the way it goes.
             let own = acceleration * self.pace * self.pace * speed.signum();

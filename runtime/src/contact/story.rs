@@ -21,7 +21,9 @@ impl Matter<'_> {
 
     /// What a grip bears of a thing and what it has to, in words.
     fn bearing(&self, robot: InstanceId, item: InstanceId) -> String {
-        let (Some(machine), Some(loose)) = (self.machines.get(&robot), self.loose.get(&item)) else { return String::new() };
+        let (Some(machine), Some(loose)) = (self.machines.get(&robot), self.loose.get(&item)) else {
+            return String::new();
+        };
         let Some(hand) = machine.hand.as_ref() else { return String::new() };
         let touches = self.world.touches(loose.body);
         let fingers = touches.iter().filter(|touch| hand.fingers.contains(&touch.by));

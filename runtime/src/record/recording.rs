@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::series::{ERROR, Series};
 use super::taken::Taken;
-use crate::exec::{Measured, StepState};
 use crate::contact::Stray;
+use crate::exec::{Measured, StepState};
 use crate::motion::{Burden, Moment};
 
 /// How much a line of the log matters.

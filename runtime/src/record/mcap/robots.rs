@@ -61,7 +61,18 @@ impl Robots {
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
         let (names, hands) = (BTreeMap::new(), BTreeMap::new());
-        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, contacts: 0, hands, next: 0, told: 0, strayed: 0 };
+        let mut out = Robots {
+            names,
+            joints: 0,
+            grips: 0,
+            loads: 0,
+            burdens: 0,
+            contacts: 0,
+            hands,
+            next: 0,
+            told: 0,
+            strayed: 0,
+        };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
