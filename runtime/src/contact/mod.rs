@@ -25,6 +25,8 @@ use crate::motion::{Actor, Moment, Performed, Stage};
 /// Longest time between two moments that are told, s; while fingers move.
 const FRAME: f64 = 0.04;
 const FINE: f64 = 0.005;
+/// No planned motion of fingers is faster than this, m/s.
+const FAST: f64 = 1.0;
 /// Fingers that are slower than this stand, m/s.
 const SLOW: f64 = 1e-3;
 /// How far beyond where they are closed fingers are led, m: its motor presses with all its force then, whatever is between them.
@@ -494,7 +496,8 @@ impl Machine {
         });
         match planned {
             Some(at) => {
-                speed = (at - hand.to) / STEP;
+                // From where they pressed to where they are planned to begin it is no way to go.
+                speed = Some((at - hand.to) / STEP).filter(|speed| speed.abs() < FAST).unwrap_or_default();
                 hand.to = at;
             }
             None => {
