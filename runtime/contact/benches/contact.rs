@@ -1,5 +1,7 @@
 //! How fast worlds of several sizes go on: real time for a second in which all of it moves, and what they cost asleep.
 
+#![allow(clippy::disallowed_methods, reason = "benches look at the clock")]
+
 use std::time::Instant;
 
 use matterix_contact::{Id, Kind, STEP, Thing, World};
