@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use matterix_runtime::contact::Really;
 use matterix_runtime::motion::Perturbation;
 use rmcp::schemars::JsonSchema;
 use serde::Deserialize;
@@ -197,15 +198,18 @@ pub struct RunArgs {
     /// Write the tables as CSV too, one column a quantity.
     #[arg(long, requires = "out")]
     pub csv: bool,
-    /// How closely motions are simulated; with `motion` they are looked at before the run begins.
-    #[arg(long, value_enum, default_value_t = Fidelity::Process)]
-    pub fidelity: Fidelity,
+    /// How closely motions are simulated; with `motion` and `contact` they are looked at before the run begins.
+    #[arg(long, value_enum, default_value_t = RunFidelity::Process)]
+    pub fidelity: RunFidelity,
     /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
     #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
     pub perturb: Option<Perturbation>,
-    /// Let the same things really be so far from where robots take them to be: `--unseen 2mm,1deg`, with `--fidelity motion`.
+    /// Let the same things really be so far from where robots take them to be: `--unseen 2mm,1deg`, with `--fidelity motion` or `contact`.
     #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
     pub unseen: Option<Perturbation>,
+    /// Let friction and the force of grips really be such a share of what is said: `--really friction=0.2,grip=0.5`, with `--fidelity contact`.
+    #[arg(long, value_name = "WHAT=SHARE[,..]", value_parser = really)]
+    pub really: Option<Really>,
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
@@ -249,6 +253,19 @@ pub enum Fidelity {
     Process,
     /// Robots move through space, around what stands there, in the time their joints need.
     Motion,
+}
+
+/// How closely a run simulates motions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(crate = "rmcp::schemars", inline)]
+pub enum RunFidelity {
+    /// Motions take their declared time.
+    Process,
+    /// Robots move through space, around what stands there, in the time their joints need.
+    Motion,
+    /// The same, and grips hold by force and friction: things slip, fall and topple.
+    Contact,
 }
 
 /// Form of the report of a run.
@@ -663,6 +680,25 @@ fn perturbation(text: &str) -> Result<Perturbation, String> {
         }
     }
     Ok(Perturbation { shift: shift.unwrap_or_default(), turn: turn.unwrap_or_default() })
+}
+
+/// Shares of friction and of the force of grips.
+fn really(text: &str) -> Result<Really, String> {
+    let wrong = || "write shares from 0 to 10, as in \"friction=0.2,grip=0.5\"".to_string();
+    let mut really = Really::default();
+    for part in text.split(',') {
+        let (name, share) = part.split_once('=').ok_or_else(wrong)?;
+        let share: f64 = share.trim().parse().map_err(|_| wrong())?;
+        if !(0.0..=10.0).contains(&share) {
+            return Err(wrong());
+        }
+        match name.trim() {
+            "friction" => really.friction = share,
+            "grip" => really.grip = share,
+            _ => return Err(wrong()),
+        }
+    }
+    Ok(really)
 }
 
 fn time(text: &str) -> Result<Duration, String> {

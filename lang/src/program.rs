@@ -957,6 +957,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let geometry = lab.geometry(id);
         let (inertial, friction) = (lab.inertial(id, &geometry), lab.friction(id));
+        let force = lab.force(id);
         let stopover = lab.is_stopover(id);
         let Geometry { frames, shape, solids, room, moving, collision, visual } = geometry;
         instances.push(SceneInstance {
@@ -976,11 +977,12 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             visual,
             inertial,
             friction,
+            force,
             stopover,
             room,
             articulation: lab.articulation(id, moving).map(Box::new),
             span,
         });
     }
-    Scene { lab: name.text.clone(), instances, carriers: lab.carriers() }
+    Scene { lab: name.text.clone(), instances, carriers: lab.carriers(), frictions: lab.frictions() }
 }

@@ -5,6 +5,7 @@
 
 pub mod backend;
 pub mod bill;
+pub mod contact;
 pub mod exec;
 pub mod fault;
 pub mod fit;

@@ -5,6 +5,7 @@ use matterix_ir::{Program, Severity, codes};
 use serde::Serialize;
 
 use crate::backend::{Backend, Dry, Moves, Prepared, Sim};
+use crate::contact::{Matter, Really};
 use crate::exec::Tee;
 use crate::exec::{self, Around, Execution, FailureTrace, Limits, Listener, RunStatus, StepRecord};
 use crate::fault::Fault;
@@ -21,6 +22,8 @@ pub enum Fidelity {
     Process,
     /// Robots move through space on ways without collision, in the time their joints need.
     Motion,
+    /// The same, and things are held by force and friction, touch and fall.
+    Contact,
     /// Nothing moves: the plan is walked with nominal durations.
     Dry,
 }
@@ -31,6 +34,7 @@ impl Fidelity {
         match self {
             Fidelity::Process => "process",
             Fidelity::Motion => "motion",
+            Fidelity::Contact => "contact",
             Fidelity::Dry => "dry",
         }
     }
@@ -49,8 +53,10 @@ pub struct RunOptions<'c> {
     pub limits: Limits<'c>,
     /// Accuracy of the process engine.
     pub process: Options,
-    /// How far things are from where robots take them to be, at fidelity `motion`.
+    /// How far things are from where robots take them to be, at fidelity `motion` and `contact`.
     pub unseen: Unseen,
+    /// How strong and how rough things really are, at fidelity `contact`.
+    pub really: Really,
 }
 
 /// What came of a run: of its plan, and of the lab.
@@ -85,7 +91,9 @@ pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) 
         Err(fault) => return refused(program, fault),
     };
     match options.fidelity {
-        Fidelity::Process | Fidelity::Motion => run_ready(program, &Prepared::new(program), params, options, out),
+        Fidelity::Process | Fidelity::Motion | Fidelity::Contact => {
+            run_ready(program, &Prepared::new(program), params, options, out)
+        }
         Fidelity::Dry => {
             let mut dry = Dry::new(&program.model, &program.plan, params.clone());
             let execution = exec::execute(&program.plan, &program.scene, &mut dry, options.limits, out);
@@ -202,8 +210,15 @@ fn twin<'p>(
     let mut engine = started.map_err(|fault| Box::new(refused(program, fault)))?;
     engine.heed(options.limits.cancel);
     let sim = Sim::new(engine, prepared, options.seed).with_unseen(&options.unseen);
-    let moves = options.fidelity == Fidelity::Motion;
+    let moves = matches!(options.fidelity, Fidelity::Motion | Fidelity::Contact);
     match Stage::new(program) {
+        Ok(stage) if options.fidelity == Fidelity::Contact => {
+            let matter = Matter::new(&options.unseen.in_stage(&stage), options.really);
+            let matter =
+                matter.map_err(|why| Box::new(refused(program, Fault::new(codes::NO_CONTACT_MODEL, 0.0, why))))?;
+            let moves = Moves { robots: true, beside: runs_beside(&program.plan) };
+            Ok(sim.with_stage(stage, moves, out).with_matter(matter))
+        }
         Ok(stage) if moves || !stage.fixtures.is_empty() => {
             Ok(sim.with_stage(stage, Moves { robots: moves, beside: runs_beside(&program.plan) }, out))
         }

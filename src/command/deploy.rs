@@ -15,7 +15,7 @@ use matterix_ir::quantity::show_number;
 use matterix_ir::{Diagnostic, FileId, Program};
 
 use super::run::Findings;
-use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
+use crate::args::{Color, DeployArgs, DeployMode, RunFidelity, RunFormat};
 use crate::panel::{Board, Panel, Watcher};
 use crate::pipeline::{self, Calibration, Choices, DeployPlan, Gauged, Input, Options, Wires};
 use crate::progress::{Kind, Progress};
@@ -72,7 +72,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let cancel = cancel::on_interrupt()?;
     if args.mode == DeployMode::SimFirst && !args.resume {
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
-        let choices = Choices::plain(args.seed, Fidelity::Process);
+        let choices = Choices::plain(args.seed, RunFidelity::Process);
         let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
         let (passed, end) = (ran.passed, ran.end_time());
         findings.show(&sources, ran.diagnostics.clone());

@@ -8,7 +8,7 @@ use matterix_runtime::exec::Turn;
 use matterix_runtime::motion::{Unseen, perturb};
 use matterix_runtime::record::Folder;
 
-use crate::args::{Color, Fidelity, RunArgs, RunFormat};
+use crate::args::{Color, RunArgs, RunFidelity, RunFormat};
 use crate::cache;
 use crate::pipeline::{self, Choices, Input, Keep, Search};
 use crate::progress::{Kind, Progress};
@@ -23,8 +23,11 @@ pub fn run(args: &RunArgs, color: Color) -> Exit {
 
 /// The run; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
-    if args.unseen.is_some() && (args.fidelity != Fidelity::Motion || args.dry) {
-        return Err("`--unseen` is of robots that move: it needs `--fidelity motion`".to_string());
+    if args.unseen.is_some() && (args.fidelity == RunFidelity::Process || args.dry) {
+        return Err("`--unseen` is of robots that move: it needs `--fidelity motion` or `contact`".to_string());
+    }
+    if args.really.is_some() && (args.fidelity != RunFidelity::Contact || args.dry) {
+        return Err("`--really` is of what holds by force and friction: it needs `--fidelity contact`".to_string());
     }
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     if let Some(dir) = &args.out {
@@ -47,7 +50,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         None => Unseen::default(),
     };
 
-    let found = match args.fidelity == Fidelity::Motion && !args.dry {
+    let found = match args.fidelity != RunFidelity::Process && !args.dry {
         true => pipeline::motions(&program, &*cache::of(args.no_cache)),
         false => pipeline::standing(&program),
     };
@@ -68,7 +71,8 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     };
     let mut progress = Progress::new(&program.plan, kind(args.format));
     let keep = if args.out.is_some() { Keep::Curves } else { Keep::Ends };
-    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns, moved, unseen, keep };
+    let (fidelity, really) = (args.fidelity, args.really.unwrap_or_default());
+    let choices = Choices { seed: args.seed, fidelity, dry: args.dry, turns, moved, unseen, really, keep };
     let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
     progress.finish();
 

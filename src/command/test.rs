@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use matterix_ir::{Diagnostic, Sources};
 use serde_json::{Value, json};
 
-use crate::args::{Color, Fidelity, TestArgs, TestFormat};
+use crate::args::{Color, RunFidelity, TestArgs, TestFormat};
 use crate::pipeline::{self, Choices, Input, Test};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Look, Reporter};
@@ -98,7 +98,7 @@ impl Trial {
             return self.tell(file, sources, test, None, found);
         };
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
-        let choices = Choices::plain(self.seed, Fidelity::Process);
+        let choices = Choices::plain(self.seed, RunFidelity::Process);
         let ran = pipeline::run(program, sources, &choices, self.cancel, &mut progress);
         progress.finish();
         let found = if ran.passed { test.diagnostics.clone() } else { ran.diagnostics.clone() };

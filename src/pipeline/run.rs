@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use matterix_ir::plan::{Condition, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
+use matterix_runtime::contact::{Really, Stray};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
@@ -44,7 +45,7 @@ pub struct Choices {
     /// Where all randomness starts.
     pub seed: u64,
     /// How closely motions are simulated.
-    pub fidelity: args::Fidelity,
+    pub fidelity: args::RunFidelity,
     /// Steps without what they cause.
     pub dry: bool,
     /// The turns of claims, where a schedule is followed.
@@ -53,22 +54,25 @@ pub struct Choices {
     pub moved: Vec<Moved>,
     /// What stands away from where robots take it to be.
     pub unseen: Unseen,
+    /// How strong and how rough things really are.
+    pub really: Really,
     /// What is kept of curves: files can be written of [`Keep::Curves`] only.
     pub keep: Keep,
 }
 
 impl Choices {
     /// Things where they are said to be, no turns, and no more kept than how it ends.
-    pub fn plain(seed: u64, fidelity: args::Fidelity) -> Self {
+    pub fn plain(seed: u64, fidelity: args::RunFidelity) -> Self {
         let (turns, moved, unseen) = (Vec::new(), Vec::new(), Unseen::default());
-        Choices { seed, fidelity, dry: false, turns, moved, unseen, keep: Keep::Ends }
+        Choices { seed, fidelity, dry: false, turns, moved, unseen, really: Really::default(), keep: Keep::Ends }
     }
 
     fn fidelity(&self) -> Fidelity {
         match self.fidelity {
             _ if self.dry => Fidelity::Dry,
-            args::Fidelity::Process => Fidelity::Process,
-            args::Fidelity::Motion => Fidelity::Motion,
+            args::RunFidelity::Process => Fidelity::Process,
+            args::RunFidelity::Motion => Fidelity::Motion,
+            args::RunFidelity::Contact => Fidelity::Contact,
         }
     }
 }
@@ -85,7 +89,8 @@ pub fn run<'a>(
     let limits = Limits { cancel: Some(cancel), turns: &choices.turns, ..Limits::default() };
     let process = Options { curves: choices.keep == Keep::Curves, ..Options::default() };
     let unseen = choices.unseen.clone();
-    let options = RunOptions { seed: choices.seed, fidelity, limits, process, unseen, ..RunOptions::default() };
+    let (seed, really) = (choices.seed, choices.really);
+    let options = RunOptions { seed, fidelity, limits, process, unseen, really, ..RunOptions::default() };
     let recording = Recording::within(program, choices.keep.error());
     let mut follower = Follower { recording, sampler: Sampler::new(&program.model), progress };
     let moved = choices.moved.iter().map(|moved| (moved, "stands", "its place"));
@@ -189,6 +194,10 @@ impl Listener for Follower<'_, '_> {
 
     fn travels(&mut self, moments: &[Moment]) {
         self.recording.travels(moments);
+    }
+
+    fn strays(&mut self, strays: &[Stray]) {
+        self.recording.strays(strays);
     }
 
     fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {

@@ -7,6 +7,7 @@ mod bill;
 mod blame;
 mod book;
 mod budget;
+mod contact;
 mod contents;
 mod delayed;
 mod deploy;

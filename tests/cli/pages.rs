@@ -76,7 +76,11 @@ fn found(code: &Code, text: &str, name: &str, strict: bool) -> (Vec<String>, End
     write(&dir, "example.mtx", text);
     let while_running = code.family.starts_with('X');
     let (ended, lines) = if while_running {
-        let ended = matterixc_in(&dir, &["run", "example.mtx", "--format", "json"]);
+        let mut args = vec!["run", "example.mtx", "--format", "json"];
+        if code.name == "no-contact-model" {
+            args.extend(["--fidelity", "contact"]);
+        }
+        let ended = matterixc_in(&dir, &args);
         let lines = ended.err_lines();
         (ended, lines)
     } else {

@@ -25,6 +25,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         visual: None,
         inertial: None,
         friction: None,
+        force: None,
         stopover: false,
         room: None,
         articulation: None,

@@ -202,6 +202,7 @@ codes! {
     CHATTERING "chattering" "X0" "a condition switches back and forth without end";
     EVENT_PENDING "event-pending" "X0" "a delayed event is set off again before it has happened";
     EVENT_CASCADE "event-cascade" "X0" "events set each other off at one instant without end";
+    NO_CONTACT_MODEL "no-contact-model" "X0" "a lab has something of which contact is not modelled";
     INTEGRATION_FAILED "integration-failed" "X0" "a quantity changes faster than any step can follow";
     NOT_A_NUMBER "not-a-number" "X0" "a quantity has no finite value";
     TRANSFER_FRACTION "transfer-fraction" "X0" "a transfer takes less than nothing or more than there is";

@@ -357,6 +357,12 @@ pub struct Load {
     pub loose: Option<NodeId>,
     /// The share of what the grip on it bears that an acceleration, of gravity or of a motion, of 1 m/s2 takes up.
     pub taxed: Option<NodeId>,
+    /// Its mass with what it contains, kg, where that may change.
+    #[serde(default)]
+    pub gross: Option<NodeId>,
+    /// The volume of what it contains, m3, closed up or not.
+    #[serde(default)]
+    pub filling: Option<NodeId>,
 }
 
 /// How fast a robot goes, where that is not as fast as its joints can.

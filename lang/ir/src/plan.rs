@@ -268,8 +268,19 @@ pub enum Motion {
 
 impl Motion {
     /// What a motion that cannot be carried out fails with.
-    pub const FAILURES: [&str; 8] =
-        ["collision", "missed", "no_way", "slip", "spilled", "too_wide", "unmovable", "unreachable"];
+    pub const FAILURES: [&str; 11] = [
+        "collision",
+        "dropped",
+        "jammed",
+        "missed",
+        "no_way",
+        "slip",
+        "spilled",
+        "too_wide",
+        "toppled",
+        "unmovable",
+        "unreachable",
+    ];
     /// What any step fails with during which a part that moves by itself runs into something, or a vessel in hand is filled over its rim.
     pub const FAILURES_BESIDE: [&str; 2] = ["collision", "spilled"];
 

@@ -173,6 +173,9 @@ pub struct Instance {
     /// Coefficient of friction of its surface, if that is known.
     #[serde(default)]
     pub friction: Option<f64>,
+    /// What each of its fingers presses with, N, if it grips and that is known.
+    #[serde(default)]
+    pub force: Option<f64>,
     /// Whether what is put on it stays for a moment only: it is put back to where it stood before.
     #[serde(default)]
     pub stopover: bool,
@@ -247,6 +250,18 @@ pub struct Scene {
     /// What takes things along beside surfaces and grippers.
     #[serde(default)]
     pub carriers: Vec<Carrier>,
+    /// Friction between two instances where that is not the lesser of theirs.
+    #[serde(default)]
+    pub frictions: Vec<Friction>,
+}
+
+/// The coefficient of friction between two instances.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Friction {
+    /// One and the other.
+    pub between: [InstanceId; 2],
+    /// Of static friction.
+    pub coefficient: f64,
 }
 
 /// An instance that takes along what one of its states names: the frame `mount` of that comes to its origin.

@@ -300,7 +300,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A pair parameter: a function of two instances whose value a lab gives with `between`.
-    fn pair_setting(&mut self, name: &str, values: &[Value]) -> Option<Value> {
+    pub(in crate::eval) fn pair_setting(&mut self, name: &str, values: &[Value]) -> Option<Value> {
         let instance = |v: &Value| match v {
             Value::Instance(i) | Value::Qualified(i, _) => Some(*i),
             _ => None,

@@ -63,10 +63,46 @@ impl Body {
 
     /// As [`Body::of_shapes`], with rooms taken out of a main shape that is a block: holes of a rack, wells of a plate.
     pub fn with_rooms(main: Option<&Shape>, more: &[Placed], rooms: &[Placed]) -> Option<Body> {
+        Body::bored(main, more, rooms, bored::pieces)
+    }
+
+    /// As [`Body::with_rooms`], with prisms around round holes instead of within: what fits such a hole fits that.
+    pub fn with_wide_rooms(main: Option<&Shape>, more: &[Placed], rooms: &[Placed]) -> Option<Body> {
+        Body::bored(main, more, rooms, bored::wide_pieces)
+    }
+
+    /// Shapes of a thing as a hand feels them from outside: vessels are full, and round walls are round. None where there are none.
+    pub fn outside<'a>(shapes: impl IntoIterator<Item = (&'a Shape, Pose)>) -> Option<Body> {
+        let mut pieces = Vec::new();
+        for (shape, at) in shapes {
+            let Shape::Turned { outside, .. } = shape else {
+                add_shape(shape, &at, &mut pieces);
+                continue;
+            };
+            for two in outside.windows(2) {
+                let ([low, z], [high, top]) = (two[0], two[1]);
+                let height = top - z;
+                if height > 0.0 && low == high {
+                    add_shape(&Shape::Cylinder([2.0 * low, height]), &at.then(Pose::up(z)), &mut pieces);
+                } else if height > 0.0 {
+                    let corners = turned::pieces(two, &[]);
+                    corners.iter().filter_map(|c| hull(c)).for_each(|hull| push(isometry(&at), hull, &mut pieces));
+                }
+            }
+        }
+        Body::of(pieces)
+    }
+
+    fn bored(
+        main: Option<&Shape>,
+        more: &[Placed],
+        rooms: &[Placed],
+        without: fn([f64; 3], &[Placed]) -> Vec<Piece>,
+    ) -> Option<Body> {
         let mut pieces = Vec::new();
         match main {
             Some(Shape::Box(size)) if !rooms.is_empty() => {
-                bored::pieces(*size, rooms).into_iter().for_each(|piece| add_piece(piece, &mut pieces));
+                without(*size, rooms).into_iter().for_each(|piece| add_piece(piece, &mut pieces));
             }
             Some(shape) => add_shape(shape, &Pose::IDENTITY, &mut pieces),
             None => {}
@@ -88,6 +124,11 @@ impl Body {
     fn of(pieces: Vec<Convex>) -> Option<Body> {
         let around = pieces.iter().map(|p| p.around).reduce(|a, b| a.merged(&b))?;
         Some(Body { pieces, around })
+    }
+
+    /// Its convex pieces, each with its place in the frame of the body.
+    pub fn pieces(&self) -> impl Iterator<Item = (Isometry, &SharedShape)> {
+        self.pieces.iter().map(|piece| (piece.at, &piece.shape))
     }
 
     /// How far its farthest point may be from the origin of its frame, m.

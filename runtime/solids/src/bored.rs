@@ -2,12 +2,15 @@
 
 use std::f64::consts::{PI, TAU};
 
-use matterix_ir::math::sin_cos;
+use matterix_ir::math::{cos, sin_cos};
 use matterix_ir::scene::{Shape, Solid};
 use parry3d_f64::math::Vector;
 
 /// Sides of the prism that stands for a round hole; its wall stands into a hole of 13 mm by 0.13 mm.
 const SIDES: u32 = 16;
+
+/// Sides of the prism that stands around a round hole: its wall is farther from the axis than that of the hole by 0.5 % at most.
+const AROUND: u32 = 32;
 
 /// What is thinner than this is left out, m.
 const THIN: f64 = 1e-5;
@@ -31,6 +34,8 @@ struct Hole {
     /// Half its extent along x and y.
     half: [f64; 2],
     round: bool,
+    /// Of the prism that stands for it, where it is round.
+    sides: u32,
     /// Where it begins and ends.
     height: [f64; 2],
 }
@@ -41,7 +46,23 @@ type Rectangle = [[f64; 2]; 2];
 /// A block, its origin in the middle of its base, without the rooms in it, m. Where holes cannot be told apart by straight
 /// cuts, the block stays whole there.
 pub fn pieces(size: [f64; 3], rooms: &[Solid]) -> Vec<Piece> {
-    let holes: Vec<Hole> = rooms.iter().filter_map(|room| hole(room, size)).collect();
+    bored(size, rooms, SIDES)
+}
+
+/// The same with prisms around the round holes instead of within: what fits a hole fits them.
+pub fn wide_pieces(size: [f64; 3], rooms: &[Solid]) -> Vec<Piece> {
+    let widened = |room: &Solid| match room.shape {
+        Shape::Cylinder([d, h]) => {
+            Solid { shape: Shape::Cylinder([d / cos(PI / f64::from(AROUND)), h]), ..room.clone() }
+        }
+        _ => room.clone(),
+    };
+    bored(size, &rooms.iter().map(widened).collect::<Vec<_>>(), AROUND)
+}
+
+fn bored(size: [f64; 3], rooms: &[Solid], sides: u32) -> Vec<Piece> {
+    let mut holes: Vec<Hole> = rooms.iter().filter_map(|room| hole(room, size)).collect();
+    holes.iter_mut().for_each(|hole| hole.sides = sides);
     let [x, y, z] = size.map(|s| s / 2.0);
     let mut out = Vec::new();
     split([[-x, x], [-y, y]], 2.0 * z, holes, &mut out);
@@ -75,6 +96,7 @@ fn hole(room: &Solid, size: [f64; 3]) -> Option<Hole> {
         middle: [px, py],
         half,
         round,
+        sides: SIDES,
         height,
     })
 }
@@ -128,7 +150,7 @@ fn cell(around: Rectangle, top: f64, hole: &Hole, out: &mut Vec<Piece>) {
     // Rays to the sides of the prism and to the corners of the rectangle; between two of them the wall is convex.
     let [cx, cy] = hole.middle;
     let corner = |x: f64, y: f64| matterix_ir::math::atan2(y - cy, x - cx);
-    let mut rays: Vec<f64> = (0..SIDES).map(|k| TAU * f64::from(k) / f64::from(SIDES) - PI).collect();
+    let mut rays: Vec<f64> = (0..hole.sides).map(|k| TAU * f64::from(k) / f64::from(hole.sides) - PI).collect();
     rays.extend([corner(x0, y0), corner(x1, y0), corner(x0, y1), corner(x1, y1)]);
     rays.sort_by(f64::total_cmp);
     rays.dedup_by(|a, b| (*a - *b).abs() < 1e-9);

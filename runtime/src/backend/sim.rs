@@ -11,9 +11,10 @@ use matterix_ir::{Leaves, NodeId, Op};
 
 use super::carried::{Attendant, Overflow, Told, carried, edge_after};
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
+use crate::contact::{Matter, Verdict};
 use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
-use crate::motion::{Burden, Moment, Refused, Stage, Stray, Unseen, supported, tempi};
+use crate::motion::{Burden, Moment, Performed, Refused, Stage, Stray, Unseen, supported, tempi};
 use crate::process::{Advance, Engine, Watch};
 
 /// What moves through space.
@@ -40,6 +41,8 @@ pub struct Sim<'m> {
     befallen: Option<(&'static str, String)>,
     /// How far things are from where the stage has them; none where nothing is.
     unseen: Option<Unseen>,
+    /// What touches what; none where things are where they are planned to be.
+    matter: Option<Matter<'m>>,
     /// What has been told of what robots carry.
     carried: Told,
     /// Laws move parts of things.
@@ -54,6 +57,9 @@ pub struct Sim<'m> {
 
 /// Longest time between two recorded moments of a motion, s.
 const FRAME: f64 = 0.04;
+
+/// How often it is looked at what touches what, s.
+const LOOK: f64 = 0.04;
 
 /// How often it is looked whether a robot in the way has begun to move, s.
 const PATIENCE: f64 = 0.25;
@@ -112,9 +118,10 @@ impl<'m> Sim<'m> {
         let (moves, befallen, carried) = (Moves::default(), None, Told::default());
         let (moments, stage, started) = (Moments::default(), None, 0);
         let turning = false;
-        let unseen = None;
+        let (unseen, matter) = (None, None);
         Sim {
             stage,
+            matter,
             moves,
             engine,
             prepared,
@@ -147,6 +154,11 @@ impl<'m> Sim<'m> {
     /// Things are really so far from where they are taken to be.
     pub fn with_unseen(self, unseen: &Unseen) -> Self {
         Sim { unseen: Some(unseen.clone()).filter(|unseen| !unseen.is_nothing()), ..self }
+    }
+
+    /// Things have mass and friction, and grips hold as far as these bear.
+    pub fn with_matter(self, matter: Matter<'m>) -> Self {
+        Sim { matter: Some(matter), ..self }
     }
 
     /// Joints stand where the model says; how they get there in so many seconds is told.
@@ -281,6 +293,10 @@ impl<'m> Sim<'m> {
         let now = self.engine.time();
         let before = self.unseen.as_ref().map(|_| stage.clone());
         let performed = stage.set_out(&motion, &values)?;
+        if self.matter.is_some() {
+            return Ok(self.set_about(&motion, performed.as_ref()));
+        }
+        let Some(stage) = self.stage.as_mut() else { return Ok(Moving::AtOnce) };
         if let (Some(unseen), Some(before)) = (&mut self.unseen, &before)
             && let Err(stray) = unseen.follow([before, stage], &motion, performed.as_ref())
         {
@@ -303,6 +319,92 @@ impl<'m> Sim<'m> {
         };
         out.travels(&there.moments(&performed, now, FRAME));
         Ok(Moving::Lasts(performed.duration()))
+    }
+
+    /// Begins a planned motion among bodies that touch.
+    fn set_about(&mut self, motion: &Motion, performed: Option<&Performed>) -> Moving {
+        let (Some(matter), Some(stage)) = (self.matter.as_mut(), self.stage.as_ref()) else { return Moving::AtOnce };
+        for load in &self.prepared.model.loads {
+            if let Some(gross) = load.gross {
+                let volume = load.filling.map_or(0.0, |node| self.engine.eval(node));
+                matter.weigh(load.instance, self.engine.eval(gross), volume);
+            }
+        }
+        let Some(robot) = stage.actor_of(motion.mover()) else { return Moving::AtOnce };
+        let planned = performed.map_or(0.0, Performed::duration);
+        let lasts = planned + matter.begin(motion, robot, performed, self.engine.time());
+        if performed.is_some() || lasts > 0.0 { Moving::Lasts(lasts) } else { Moving::AtOnce }
+    }
+
+    /// What of a motion that is under way has come about otherwise than planned: a status where that is not settled.
+    fn touched(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Option<Status>, Fault> {
+        let now = self.engine.time();
+        let (Some(matter), Some(stage), Some(running)) =
+            (self.matter.as_mut(), self.stage.as_ref(), self.running.get(&ticket))
+        else {
+            return Ok(None);
+        };
+        let Some(robot) = running.motion.as_ref().and_then(|motion| stage.actor_of(motion.mover())) else {
+            return Ok(None);
+        };
+        let verdict = match running.ends {
+            Ends::At(at) if now >= at => matter.ends(robot, stage),
+            Ends::At(_) => matter.verdict(robot),
+            _ => Verdict::Well,
+        };
+        let status = match verdict {
+            Verdict::Well => None,
+            Verdict::Waits => Some(Status::Running { until: Some(now + LOOK), watch: None }),
+            Verdict::Failed(name, text) => {
+                if let Some(running) = self.running.get_mut(&ticket) {
+                    running.ends = Ends::Failed(name.to_string(), text);
+                }
+                self.look_again(Some(robot), out)?;
+                None
+            }
+        };
+        self.tell_matter(out);
+        Ok(status)
+    }
+
+    /// Robots see where everything is now, and the states of the model say so.
+    fn look_again(&mut self, stopped: Option<InstanceId>, out: &mut dyn Listener) -> Result<(), Fault> {
+        let (Some(matter), Some(stage)) = (self.matter.as_mut(), self.stage.as_mut()) else { return Ok(()) };
+        let found = matter.found(stage);
+        if let Some(robot) = stopped
+            && let Some(joints) = matter.stop(robot)
+        {
+            stage.stops(robot, &joints);
+        }
+        let mut states = Vec::new();
+        for thing in &found {
+            if thing.held.is_some() {
+                stage.lies_in_hand(thing.thing, thing.at);
+                continue;
+            }
+            stage.lies(thing.thing, thing.at, thing.on);
+            let on = thing.on.map_or(-1.0, |on| f64::from(on.0));
+            for (index, state) in (0u32..).zip(&self.prepared.model.states) {
+                if supported(stage.scene, &state.name, &state.domain) == Some(thing.thing) {
+                    states.push((index, on));
+                } else if self.engine.state(index) == f64::from(thing.thing.0) && stage.is_of_a_robot(state) {
+                    states.push((index, -1.0));
+                }
+            }
+        }
+        self.engine.put(&states, out)
+    }
+
+    /// Hands on what has moved.
+    fn tell_matter(&mut self, out: &mut dyn Listener) {
+        let Some(matter) = self.matter.as_mut() else { return };
+        let (moments, strays) = matter.told();
+        if !moments.is_empty() {
+            out.travels(&moments);
+        }
+        if !strays.is_empty() {
+            out.strays(&strays);
+        }
     }
 
     /// How an operation with a motion goes on. One that another robot is in the way of waits for it to go away, no
@@ -347,8 +449,14 @@ impl<'m> Sim<'m> {
             if let Some(id) = supported(stage.scene, &state.name, &state.domain) {
                 let before = stage.below(id);
                 stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
-                if let Some(unseen) = self.unseen.as_mut().filter(|_| stage.below(id) != before) {
+                if stage.below(id) == before {
+                    continue;
+                }
+                if let Some(unseen) = self.unseen.as_mut() {
                     unseen.forget(id);
+                }
+                if let Some(matter) = self.matter.as_mut() {
+                    matter.put(id, stage.pose(id), stage.below(id).map(|below| stage.whole(below)));
                 }
             }
         }
@@ -568,6 +676,9 @@ impl Backend for Sim<'_> {
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
         self.try_again(ticket, out)?;
+        if let Some(status) = self.touched(ticket, out)? {
+            return Ok(status);
+        }
         // What comes about by itself fails the first operation that is asked for.
         if let Some(running) = self.running.get_mut(&ticket)
             && let Some((name, text)) = self.befallen.take()
@@ -612,13 +723,22 @@ impl Backend for Sim<'_> {
         }
         if let (Some(stage), Some(halted)) = (self.stage.as_mut(), halted) {
             stage.let_go(halted.motion.as_ref());
+            let robot = halted.motion.as_ref().and_then(|motion| stage.actor_of(motion.mover()));
+            if let (Some(matter), Some(robot)) = (self.matter.as_mut(), robot)
+                && let Some(joints) = matter.stop(robot)
+            {
+                stage.stops(robot, &joints);
+            }
         }
     }
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         loop {
             let before = self.engine.time();
-            let next = if self.turning { until.min(edge_after(before)) } else { until };
+            let mut next = if self.turning { until.min(edge_after(before)) } else { until };
+            if self.matter.as_ref().is_some_and(Matter::is_awake) {
+                next = next.min(before + LOOK);
+            }
             let advance = self.go_on(next, watches, out)?;
             let there = self.engine.time() >= until;
             match advance {
@@ -632,6 +752,28 @@ impl Backend for Sim<'_> {
 }
 
 impl Sim<'_> {
+    /// Bodies have come to where they are now.
+    fn touch(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
+        let now = self.engine.time();
+        let (Some(matter), Some(stage)) = (self.matter.as_mut(), self.stage.as_ref()) else { return Ok(()) };
+        matter.go_to(now, stage);
+        let moving = |robot: InstanceId| {
+            let motions = self.running.values().filter_map(|running| running.motion.as_ref());
+            motions.into_iter().any(|motion| stage.actor_of(motion.mover()) == Some(robot))
+        };
+        let befallen = matter.befallen(moving);
+        if let Some((failure, text)) = befallen {
+            self.look_again(None, out)?;
+            if self.running.is_empty() {
+                let fault = Fault::new(codes::COLLISION, now, text);
+                return Err(fault.help("see what held it, and what touched it"));
+            }
+            self.befallen.get_or_insert((failure, text));
+        }
+        self.tell_matter(out);
+        Ok(())
+    }
+
     /// Lets time pass, and things with it.
     fn go_on(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         let before = self.engine.time();
@@ -644,6 +786,7 @@ impl Sim<'_> {
             }
             self.befallen.get_or_insert(("collision", text));
         }
+        self.touch(out)?;
         if let Some(text) = overflow.map(|overflow| self.overflow(overflow)) {
             if self.running.is_empty() {
                 let fault = Fault::new(codes::SPILLED, self.engine.time(), text);

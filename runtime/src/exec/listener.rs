@@ -5,6 +5,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Span, Unit};
 use serde::{Deserialize, Serialize};
 
+use crate::contact::Stray;
 use crate::motion::{Burden, Moment};
 
 use super::failure::{FailureTrace, Measured};
@@ -133,6 +134,8 @@ pub trait Listener: Observer {
     fn reading(&mut self, time: f64, reading: usize, value: f64) {}
     /// A robot begins to move: where it is from moment to moment until it stands still again.
     fn travels(&mut self, moments: &[Moment]) {}
+    /// Loose things move by what touches them: where they are from moment to moment.
+    fn strays(&mut self, strays: &[Stray]) {}
     /// How a thing that a robot carries may be moved from now on.
     fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {}
     /// Steps that are asked for now: each is done beside the plan, and its failure is told but ends nothing else.

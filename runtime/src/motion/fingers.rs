@@ -83,6 +83,11 @@ impl Fingers {
         (out.apart[1] > out.apart[0] + EXACT).then_some(out)
     }
 
+    /// Where the first of its joints stands when it is closed and when it is open, rad or m.
+    pub fn span(&self) -> Option<[f64; 2]> {
+        Some([*self.ends[0].first()?, *self.ends[1].first()?])
+    }
+
     /// How far the fingers open at most, m.
     pub fn opening(&self) -> f64 {
         self.apart[1]

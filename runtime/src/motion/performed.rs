@@ -120,7 +120,7 @@ impl Performed {
     }
 
     /// Gives a moment the speeds and accelerations that joints have at a time since the beginning, s.
-    pub(super) fn rush(&self, moment: &mut Moment, time: f64) {
+    pub(crate) fn rush(&self, moment: &mut Moment, time: f64) {
         for part in &self.parts {
             let Some(state) = self.state(&part.joints, time) else { continue };
             let put = |values: &[f64], all: &mut [f64]| {

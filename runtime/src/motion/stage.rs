@@ -6,6 +6,7 @@ use std::hash::Hasher;
 use std::sync::{Arc, OnceLock};
 
 use matterix_ir::Program;
+use matterix_ir::model::{Domain, State};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Robot;
 use matterix_ir::scene::{InstanceId, Scene, Stand, frame};
@@ -260,6 +261,38 @@ impl<'p> Stage<'p> {
     pub fn put(&mut self, id: InstanceId, on: InstanceId, at: Pose) {
         if self.carried.set(id, Carried::Stands(Stand::On(on, at))).is_some() {
             self.changes += 1;
+        }
+    }
+
+    /// A thing is somewhere in the lab, and what bears it there takes it along.
+    pub fn lies(&mut self, id: InstanceId, at: Pose, on: Option<InstanceId>) {
+        self.carried.set(id, Carried::Stands(Stand::Lab(at)));
+        self.carry(id, on.filter(|on| self.hand_of(*on).is_none()));
+    }
+
+    /// A thing is so in a hand that has it already.
+    pub fn lies_in_hand(&mut self, id: InstanceId, at: Pose) {
+        if let Some(Carried::Held(by, _)) = self.carried.get(id.0 as usize).copied() {
+            let inner = self.tip(by).inverse().then(at);
+            self.carried.set(id, Carried::Held(by, inner));
+            self.changes += 1;
+        }
+    }
+
+    /// Whether a state names an instance and is of a robot: what it holds.
+    pub fn is_of_a_robot(&self, state: &State) -> bool {
+        let owner = state.name.rsplit_once('.').and_then(|(owner, _)| self.scene.find(owner));
+        state.domain == Domain::Instance && owner.is_some_and(|owner| self.actor_of(owner).is_some())
+    }
+
+    /// A robot has stopped on its way with its joints so.
+    pub fn stops(&mut self, robot: InstanceId, joints: &[f64]) {
+        self.flights.remove(&robot);
+        self.came.remove(&robot);
+        self.changes += 1;
+        if let Some(actor) = self.actors.get_mut(&robot) {
+            actor.joints.clear();
+            actor.joints.extend_from_slice(joints);
         }
     }
 

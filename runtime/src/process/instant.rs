@@ -169,7 +169,7 @@ impl Engine<'_> {
     }
 
     /// Sets a state from outside the integration.
-    fn write(&mut self, state: u32, value: f64) {
+    pub(super) fn write(&mut self, state: u32, value: f64) {
         if self.state(state).to_bits() == value.to_bits() {
             return;
         }

@@ -429,6 +429,15 @@ impl<'m> Engine<'m> {
         self.settle(last, observer)
     }
 
+    /// Some states are otherwise from now on, by what has come about outside the model; then the events fire that became true.
+    pub fn put(&mut self, states: &[(u32, f64)], observer: &mut dyn Observer) -> Result<(), Fault> {
+        self.release(observer)?;
+        self.unshown.extend(states.iter().map(|(state, _)| *state));
+        self.show(observer);
+        states.iter().for_each(|(state, value)| self.write(*state, *value));
+        self.settle(None, observer)
+    }
+
     /// Takes the last sample, of all states, and checks that the balances close.
     pub fn finish(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
         for part in self.course.parts.ids() {

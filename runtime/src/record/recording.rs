@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::series::{ERROR, Series};
 use super::taken::Taken;
+use crate::contact::Stray;
 use crate::exec::{Measured, StepState};
 use crate::motion::{Burden, Moment};
 
@@ -121,6 +122,8 @@ pub struct Recording {
     pub observables: Vec<Vec<Series>>,
     /// Where robots were while they moved, in order of time.
     pub moments: Vec<Moment>,
+    /// Where loose things were while what touched them moved them, in order of time.
+    pub strays: Vec<Stray>,
     /// How what robots carry may be moved, in order of occurrence.
     pub burdens: Vec<BurdenMark>,
     /// In order of occurrence.
@@ -149,6 +152,11 @@ impl Recording {
         let known = self.moments.partition_point(|m| m.time <= first);
         self.moments.extend_from_slice(moments);
         self.moments[known..].sort_by(|a, b| a.time.total_cmp(&b.time));
+    }
+
+    /// Loose things move.
+    pub fn strays(&mut self, strays: &[Stray]) {
+        self.strays.extend_from_slice(strays);
     }
 
     /// How a thing that a robot carries may be moved changes.

@@ -62,6 +62,7 @@ impl Lab {
             visual: None,
             inertial: None,
             friction: None,
+            force: None,
             stopover: false,
             room: None,
             articulation: None,

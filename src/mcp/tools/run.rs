@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 
 use super::Task;
 use super::arguments::{bytes, options};
-use crate::args::Fidelity;
+use crate::args::RunFidelity;
 use crate::mcp::answer::{Answer, bounded, pruned};
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
@@ -37,7 +37,7 @@ pub struct Run {
     #[serde(default)]
     seed: u64,
     /// How closely motions are simulated; `process` if not given.
-    fidelity: Option<Fidelity>,
+    fidelity: Option<RunFidelity>,
     /// Only these members of the report, as `expectations` or `contents`; all that fit if not given.
     members: Option<Vec<String>>,
     /// The most that the answer may take, as text and as data; 60000 if not given.
@@ -77,10 +77,10 @@ impl Task for Run {
     fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let bytes = bytes(self.bytes)?;
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
-        let fidelity = self.fidelity.unwrap_or(Fidelity::Process);
+        let fidelity = self.fidelity.unwrap_or(RunFidelity::Process);
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
         let Some(program) = program.filter(|_| !is_wrong(&found)) else { return unrun(&sources, found) };
-        if fidelity == Fidelity::Motion {
+        if fidelity != RunFidelity::Process {
             found.extend(pipeline::motions(&program, desk));
             if is_wrong(&found) {
                 return unrun(&sources, found);

@@ -4,7 +4,7 @@ use matterix_ir::inertia::{impossible, of_shapes};
 use matterix_ir::model::{Load, Pace};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Inertial;
-use matterix_ir::scene::{InstanceId, frame};
+use matterix_ir::scene::{Friction, InstanceId, frame};
 use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Elaborator;
@@ -22,6 +22,13 @@ const STOPOVER: &str = "stopover";
 /// the grip bears that an acceleration takes up.
 const LOOSE: (&str, &str) = ("loose", "Volume");
 const TAXED: (&str, &str) = ("taxed", "Ratio");
+/// The members that say how heavy it is with what it contains, and how much room that takes.
+const GROSS: (&str, &str) = ("gross", "Mass");
+const FILLING: (&str, &str) = ("filling", "Volume");
+/// The member that says what the fingers of a gripper press with.
+const FORCE: (&str, &str) = ("force", "Force");
+/// The function that gives the friction between two things, which a lab may set for a pair.
+const SLIDING: &str = "sliding";
 
 /// The members that say how fast a robot goes: how many times as long its motions take, and the greatest speed of its tip.
 const SLOWNESS: (&str, &str) = ("slowness", "Ratio");
@@ -64,11 +71,33 @@ impl<'a> Elaborator<'a> {
         self.plain(id, FRICTION).filter(|f| f.is_finite())
     }
 
+    /// What each finger of a gripper presses with, N, if it is known.
+    pub fn force(&mut self, id: InstanceId) -> Option<f64> {
+        self.plain(id, FORCE).filter(|f| f.is_finite())
+    }
+
+    /// The friction of pairs that the lab gives.
+    pub fn frictions(&mut self) -> Vec<Friction> {
+        let pairs = self.pairs.iter().filter(|pair| pair.name == SLIDING).map(|pair| [pair.a, pair.b]);
+        let pairs: Vec<[InstanceId; 2]> = pairs.collect();
+        let given = pairs.into_iter().filter_map(|between| {
+            let value = self.pair_setting(SLIDING, &between.map(Value::Instance))?;
+            let Value::Num(number) = value else { return None };
+            Some(Friction { between, coefficient: self.known(number.node)? })
+        });
+        given.collect()
+    }
+
     /// How an instance may be moved by who holds it; nothing where any motion will do.
     pub fn load(&mut self, id: InstanceId) -> Option<Load> {
         let loose = self.changing(id, LOOSE);
         let taxed = self.changing(id, TAXED);
-        (loose.is_some() || taxed.is_some()).then_some(Load { instance: id, loose, taxed })
+        if loose.is_none() && taxed.is_none() {
+            return None;
+        }
+        let gross = self.changing(id, GROSS).filter(|node| self.graph.constant(*node).is_none());
+        let filling = self.changing(id, FILLING);
+        Some(Load { instance: id, loose, taxed, gross, filling })
     }
 
     /// How fast a robot goes, where it does not go as fast as it can.

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::Sink;
 use super::schema::{list, object, text};
+use crate::contact::Pressed;
 use crate::motion::Stage;
 
 /// What a robot holds from now on.
@@ -29,6 +30,29 @@ pub(super) struct Burdened<'a> {
     pub(super) loose: f64,
     /// What acceleration, of gravity and of the motion, the grip on it bears, m/s2; none where that has no limit.
     pub(super) borne: Option<f64>,
+}
+
+/// What touches a loose thing, while anything of it moves.
+#[derive(Serialize)]
+pub(super) struct Touched<'a> {
+    pub(super) thing: &'a str,
+    pub(super) touches: &'a [Pressed],
+}
+
+/// Schema of [`Touched`].
+pub(super) fn touched_schema() -> Value {
+    let three = |what: &str| json!({ "type": "array", "items": { "type": "number" }, "description": what });
+    let touch = object(
+        "matterix.Pressed",
+        [
+            ("by", text("What touches it")),
+            ("point", three("Where, in the lab, m")),
+            ("press", three("Force across the surface on the thing, N")),
+            ("rub", three("Force along the surface on the thing, N")),
+            ("friction", json!({ "type": "number", "description": "Coefficient of friction" })),
+        ],
+    );
+    object("matterix.Touched", [("thing", text("Name of the thing")), ("touches", list(touch))])
 }
 
 /// Schema of [`Burdened`].

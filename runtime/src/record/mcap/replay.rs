@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand, frame};
 
+use crate::contact::Stray;
 use crate::motion::{Carried, Moment, Stage, supported};
 use crate::record::run::Run;
 
@@ -91,6 +92,18 @@ impl<'p> Replay<'p> {
                 self.freed.insert(id);
             }
         }
+    }
+
+    /// A loose thing is somewhere else from now on; what it is, with all that goes along.
+    pub(super) fn strayed(&mut self, stray: &Stray) -> Vec<(InstanceId, Pose)> {
+        let (id, Some(at)) = (stray.thing, stray.at) else { return Vec::new() };
+        let on = self.stage.stand_of(id);
+        self.stage.lies(id, at, on);
+        self.freed.insert(id);
+        let mut going = vec![id];
+        let all = (0..self.stage.scene.instances.len() as u32).map(InstanceId);
+        going.extend(all.filter(|other| *other != id && self.stage.carriers(*other).contains(&id)));
+        going.into_iter().map(|id| (id, self.stage.pose(id))).collect()
     }
 
     /// The states that say where things are.

@@ -39,31 +39,49 @@ pub(super) struct Robots {
     grips: u16,
     loads: u16,
     burdens: u16,
+    contacts: u16,
     /// By robot, what it last held, with what goes along, and how often things had changed hands by then.
     hands: BTreeMap<InstanceId, Hand>,
     /// The first moment that has not been written.
     next: usize,
     /// The first burden that has not been written.
     told: usize,
+    /// The first stray that has not been written.
+    strayed: usize,
 }
 
 impl Robots {
     /// Writes all robots as they stand at the beginning.
     pub(super) fn begin<W: Write + Seek>(
         stage: &Stage<'_>,
+        touched: bool,
         sink: &mut Sink<W>,
         entities: u16,
         frames: u16,
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
         let (names, hands) = (BTreeMap::new(), BTreeMap::new());
-        let mut out = Robots { names, joints: 0, grips: 0, loads: 0, burdens: 0, hands, next: 0, told: 0 };
+        let mut out = Robots {
+            names,
+            joints: 0,
+            grips: 0,
+            loads: 0,
+            burdens: 0,
+            contacts: 0,
+            hands,
+            next: 0,
+            told: 0,
+            strayed: 0,
+        };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
         out.joints = sink.channel("/joints", "foxglove.JointStates", &foxglove::joints_schema(), &units)?;
         out.grips = sink.channel("/grips", "matterix.Grip", &bodies::grip_schema(), &units)?;
         out.burdens = sink.channel("/burdens", "matterix.Burden", &bodies::burden_schema(), &units)?;
+        if touched {
+            out.contacts = sink.channel("/contacts", "matterix.Touched", &bodies::touched_schema(), &units)?;
+        }
         if !stage.scene.carriers.is_empty() {
             out.loads = sink.channel("/loads", "matterix.Load", &bodies::load_schema(), &units)?;
         }
@@ -96,6 +114,7 @@ impl Robots {
         let mut travelled = false;
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
+            self.strays(run, moment.time, sink, frames, replay)?;
             replay.moment(moment);
             self.grip(replay, moment, sink)?;
             self.burdens(run, moment.time, sink)?;
@@ -114,8 +133,34 @@ impl Robots {
                 sink.push(frames, moment.time, &FrameTransforms { transforms })?;
             }
         }
+        travelled |= self.strays(run, time, sink, frames, replay)?;
         self.burdens(run, time, sink)?;
         Ok(travelled)
+    }
+
+    /// Writes where loose things have moved up to a time, s; whether any have.
+    fn strays<W: Write + Seek>(
+        &mut self,
+        run: &Run<'_>,
+        time: f64,
+        sink: &mut Sink<W>,
+        frames: u16,
+        replay: &mut Replay<'_>,
+    ) -> McapResult<bool> {
+        let first = self.strayed;
+        while let Some(stray) = run.recording.strays.get(self.strayed).filter(|stray| stray.time <= time) {
+            self.strayed += 1;
+            let going = replay.strayed(stray).into_iter();
+            let scene = &run.program.scene;
+            let transforms: Vec<FrameTransform> =
+                going.map(|(id, at)| transform(stray.time, &scene.get(id).name, at)).collect();
+            if !transforms.is_empty() {
+                sink.push(frames, stray.time, &FrameTransforms { transforms })?;
+            }
+            let touched = bodies::Touched { thing: &scene.get(stray.thing).name, touches: &stray.touches };
+            sink.push(self.contacts, stray.time, &touched)?;
+        }
+        Ok(self.strayed > first)
     }
 
     /// Writes what is in a hand, with all that goes along, where that is something else than before.

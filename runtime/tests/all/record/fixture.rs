@@ -56,6 +56,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         visual: None,
         inertial: None,
         friction: None,
+        force: None,
         stopover: false,
         room: None,
         articulation: None,
