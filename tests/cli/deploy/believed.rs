@@ -243,8 +243,11 @@ fn a_device_that_answers_nothing_at_the_start_ends_the_run() {
     }
 }
 
+/// What devices heard, each by its serial number.
+type Heard = Vec<(&'static str, String)>;
+
 /// A line whose devices change places when one of them has been told to begin: whoever connects again meets the other.
-fn exchanged() -> (String, Arc<Mutex<Vec<(&'static str, String)>>>) {
+fn exchanged() -> (String, Arc<Mutex<Heard>>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
     let heard = Arc::new(Mutex::new(Vec::new()));
@@ -258,7 +261,7 @@ fn exchanged() -> (String, Arc<Mutex<Vec<(&'static str, String)>>>) {
     (address, heard)
 }
 
-fn meet(stream: TcpStream, serial: &'static str, heard: &Mutex<Vec<(&'static str, String)>>) {
+fn meet(stream: TcpStream, serial: &'static str, heard: &Mutex<Heard>) {
     let mut out = stream.try_clone().expect("a stream");
     let mut going = false;
     for line in BufReader::new(stream).split(b'\r').map_while(Result::ok) {
@@ -338,6 +341,7 @@ workflow zeroes in bench { let a = v.net; wait 300 ms; zero v; let b = v.net; no
 ";
 
 /// It tells how long it has been there, in s as g, so often; `T` sets it to 0.
+#[allow(clippy::disallowed_methods, reason = "a device lives by the clock of the room")]
 fn streamer(every: Duration) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
