@@ -27,6 +27,11 @@ impl Ended {
     }
 }
 
+/// A text without its line breaks: findings are wrapped.
+pub fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// The command with nothing in its environment that changes its output.
 pub fn command() -> Command {
     in_its_environment(env!("CARGO_BIN_EXE_matterixc"))

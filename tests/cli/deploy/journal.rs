@@ -9,7 +9,7 @@ use std::time::Duration;
 use matterix_hardware::deploy::Chain;
 
 use super::{Emulated, HEAT, bench, lines};
-use crate::harness::{Ended, command, matterixc_in, write};
+use crate::harness::{Ended, command, flat, matterixc_in, write};
 
 /// A plate must hear something every 15 s of lab time: slow enough for a process to end and another to begin.
 const SLOW: &str = "4";
@@ -91,7 +91,7 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
         write(&dir, "journal", &text);
         let ended = resumed(&dir, "lab.toml");
         assert_eq!(ended.code, 1, "{name}: {}", ended.err);
-        let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        let one_line = flat(&ended.err);
         assert!(one_line.contains("journal-mismatch") && one_line.contains(why), "{name}: {}", ended.err);
         assert!(one_line.contains("made safe meanwhile: `plate`"), "{name}: {}", ended.err);
         // Nothing is mended, but whoever mends it does not go on either.
@@ -104,7 +104,7 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
     let shut = before.replacen("\"open\"", "\"shut\"", 1);
     write(&dir, "journal", &shut);
     let ended = resumed(&dir, "lab.toml");
-    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&ended.err);
     assert!(ended.code == 1 && one_line.contains("could not be gone on with"), "{}", ended.err);
 }
 
@@ -121,7 +121,7 @@ fn another_program_another_seed_and_another_end_are_refused() {
     // The plate is off by now: whoever goes on would believe that it heats.
     for dir in [&dir, &seeded_dir] {
         let right = resumed(dir, "lab.toml");
-        let one_line = right.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        let one_line = flat(&right.err);
         assert!(right.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
         assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
     }
@@ -220,7 +220,7 @@ fn a_watchdog_that_may_have_tripped_does_not_and_the_plate_is_made_safe() {
     let (dir, _emulated) = killed_in("impatient", &patient("6 s"));
     std::thread::sleep(Duration::from_millis(2000));
     let ended = resumed(&dir, "lab.toml");
-    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("journal-mismatch") && said.contains("its watchdog waits 6 s"), "{said}");
     assert!(said.contains("made safe meanwhile: `plate`"), "{said}");
 }
@@ -251,7 +251,7 @@ fn two_processes_do_not_speak_over_one_line() {
     other[7] = "another";
     let second = matterixc_in(&dir, &other);
     assert_eq!(second.code, 1, "{}", second.err);
-    let said = second.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&second.err);
     assert!(
         said.contains(&format!("is taken: process {} (", first.id())) && said.contains("nothing was said"),
         "{said}"
@@ -337,7 +337,9 @@ fn counterfoil(journal: &str) -> std::path::PathBuf {
 
 #[test]
 fn an_older_copy_of_a_journal_is_refused_and_the_devices_are_made_safe() {
-    let dir = bench("older", &text(), "plate", "");
+    // Time between the two commands: a copy is taken there.
+    let apart = text().replace("    heat plate to 50 degC", "    wait 8 s\n    heat plate to 50 degC");
+    let dir = bench("older", &apart, "plate", "");
     let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
     write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
     let mut process = deployed(&dir);
@@ -349,7 +351,7 @@ fn an_older_copy_of_a_journal_is_refused_and_the_devices_are_made_safe() {
     process.wait().expect("it ends");
     write(&dir, "journal", whole);
     let ended = resumed(&dir, "lab.toml");
-    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&ended.err);
     assert!(ended.code == 1 && one_line.contains("is an older copy: it has"), "{one_line}");
     assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
     // It is known from here on that the plate is off, whichever copy is put there.
@@ -370,7 +372,7 @@ fn a_copy_from_before_the_end_is_refused_after_it() {
     assert_eq!(process.wait_with_output().expect("it ends").status.code(), Some(1));
     write(&dir, "journal", &copy[..=copy.rfind('\n').expect("a line")]);
     let ended = resumed(&dir, "lab.toml");
-    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&ended.err);
     assert!(ended.code == 1 && one_line.contains("is an older copy: it has"), "{one_line}");
 }
 
@@ -395,7 +397,7 @@ fn where_nothing_can_be_kept_beside_a_journal_nothing_is_sent() {
     let deployed = || command().current_dir(&dir).env_remove("XDG_STATE_HOME").env_remove("HOME").args(DEPLOY).output();
     for _ in 0..2 {
         let ended = deployed().expect("the command starts");
-        let said = String::from_utf8_lossy(&ended.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        let said = flat(&String::from_utf8_lossy(&ended.stderr));
         assert_eq!(ended.status.code(), Some(1), "{said}");
         assert!(said.contains("its counterfoil: there is no folder for it"), "{said}");
         assert!(device.heard().is_empty(), "{:?}", device.heard());
@@ -419,7 +421,7 @@ fn a_journal_that_is_cut_or_replaced_meanwhile_ends_the_deployment_and_cannot_be
         }
         write(&dir, "journal", if name == "cut" { "" } else { &copy });
         let ended = process.wait_with_output().expect("it ends");
-        let said = String::from_utf8_lossy(&ended.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        let said = flat(&String::from_utf8_lossy(&ended.stderr));
         assert!(ended.status.code() == Some(1) && said.contains("the journal cannot be written"), "{name}: {said}");
         write(&dir, "journal", &copy[..=copy.rfind('\n').expect("a line")]);
         let again = resumed(&dir, "lab.toml");
@@ -472,7 +474,7 @@ fn plates_that_were_exchanged_or_both_moved_are_not_gone_on_with() {
         };
         write(&dir, "now.toml", now);
         let ended = resumed(&dir, "now.toml");
-        let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        let one_line = flat(&ended.err);
         assert!(ended.code == 1 && one_line.contains("nobody can tell which of them is which"), "{name}: {one_line}");
         assert!(one_line.contains("made safe meanwhile: `left`, `right`"), "{name}: {one_line}");
     }
@@ -506,7 +508,7 @@ fn a_journal_of_another_version_is_refused_and_the_devices_are_made_safe() {
     // What this machine knows of it is that it was written otherwise.
     std::fs::remove_file(counterfoil(&before)).expect("it has one");
     let ended = matterixc_in(&dir, &[&DEPLOY[..], &["--resume", "--vouch"]].concat());
-    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&ended.err);
     assert_eq!(ended.code, 1, "{one_line}");
     assert!(one_line.contains("written by version 0.0.1 of this program"), "{one_line}");
     assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
