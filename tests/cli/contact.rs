@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::harness::{Ended, folder, matterixc, matterixc_in, write};
+use crate::harness::{Ended, flat, folder, matterixc, matterixc_in, write};
 
 /// A beaker with so much water and a vial on a table, an arm whose fingers press with so much, and what it does.
 fn bench(force: &str, water: &str, lines: &str) -> String {
@@ -27,10 +27,6 @@ fn run(dir: &Path, more: &[&str]) -> Ended {
     let mut all = vec!["run", "bench.mtx", "--fidelity", "contact"];
     all.extend(more);
     matterixc_in(dir, &all)
-}
-
-fn flat(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 const CARRY: &str = "pick beaker by panda\n    wait 3 s\n    put back beaker by panda";

@@ -5,7 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::harness::{Ended, folder, matterixc, matterixc_in, root, write};
+use crate::harness::{Ended, flat, folder, matterixc, matterixc_in, root, write};
 
 fn emit(file: &str, target: &str) -> Ended {
     matterixc(&["emit", file, "--target", target])
@@ -101,7 +101,7 @@ fn refused(name: &str, text: &str, target: &str) -> String {
     assert_eq!(ended.code, 1, "{name}: {}", ended.err);
     assert!(!dir.join("out").exists(), "{name}: something is written");
     assert!(ended.out.is_empty());
-    ended.err.split_whitespace().collect::<Vec<_>>().join(" ")
+    flat(&ended.err)
 }
 
 /// A deck with a hotplate beside it.

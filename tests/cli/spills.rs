@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::harness::{folder, matterixc, matterixc_in, write};
+use crate::harness::{flat, folder, matterixc, matterixc_in, write};
 
 /// A lab with two beakers of 250 mL, an arm and a balance.
 fn bench(arm: &str, target: &str, volume: &str, more: &str, steps: &str) -> String {
@@ -116,7 +116,7 @@ fn a_stream_that_misses_a_narrow_mouth_is_found_and_a_slow_one_goes_in() {
     let dir = folder("spills_narrow");
     write(&dir, "quick.mtx", bench(", pour_rate: 40 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
     let quick = matterixc_in(&dir, &["check", "--no-cache", "quick.mtx"]);
-    let said = quick.out.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&quick.out);
     assert!(quick.code == 1 && said.contains("the mouth of `target` is 19 mm wide"), "{}{}", quick.out, quick.err);
     write(&dir, "slow.mtx", bench(", pour_rate: 1 g/s", "Erlenmeyer50mL", "100 mL", "", pour));
     let slow = matterixc_in(&dir, &["check", "--no-cache", "slow.mtx"]);

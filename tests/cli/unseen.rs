@@ -8,7 +8,7 @@ use matterix_ir::pose::Pose;
 use matterix_runtime::motion::{Perturbation, Stage, Stray, Unseen};
 
 use crate::gripping::{compiled, motions};
-use crate::harness::{Ended, folder, matterixc, matterixc_in, write};
+use crate::harness::{Ended, flat, folder, matterixc, matterixc_in, write};
 
 /// A vial of 17 mm on a table, and a block with a hole of this width.
 fn bench(bore: &str, lines: &str) -> String {
@@ -35,10 +35,6 @@ fn run(dir: &Path, more: &[&str]) -> Ended {
     let mut all = vec!["run", "bench.mtx", "--fidelity", "motion"];
     all.extend(more);
     matterixc_in(dir, &all)
-}
-
-fn flat(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// How far a pose is from another one as a hand sees it, m.

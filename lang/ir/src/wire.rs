@@ -346,6 +346,11 @@ impl Driver {
         identities.chain([&self.open, &self.close, &self.halt, &self.safe].into_iter().flatten())
     }
 
+    /// What the device tells by itself, each with its place among all that it tells.
+    pub fn heard(&self) -> impl Iterator<Item = (usize, &Told)> {
+        self.told.iter().enumerate().filter(|(_, told)| told.heard.is_some())
+    }
+
     /// What is said for an operation of the plan.
     pub fn call(&self, step: StepId) -> Option<&Exchange> {
         self.calls.iter().find(|(s, _)| *s == step).map(|(_, exchange)| exchange)

@@ -42,13 +42,11 @@ impl<'a> Elaborator<'a> {
                     Value::Function(id)
                 }
                 _ => {
-                    let d = self.tables.names.unknown(scope.module, n, "function", |k| {
+                    let mut d = self.tables.names.unknown(scope.module, n, "function", |k| {
                         matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })
                     });
-                    self.report(match hints::of_function(&n.text) {
-                        Some(hint) => d.help(hint),
-                        None => d,
-                    });
+                    d.help.extend(hints::of_function(&n.text).map(str::to_owned));
+                    self.report(d);
                     return Value::Error;
                 }
             },

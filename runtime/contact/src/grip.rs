@@ -97,16 +97,12 @@ impl World {
 
     /// Where the fingers are, m: the mean of both.
     pub fn opened(&self, grip: GripId) -> f64 {
-        let Some(joined) = self.grips.get(grip.0) else { return 0.0 };
-        let all = joined.grip.fingers.map(|finger| self.slid(&joined.grip, &finger));
-        (all[0][0] + all[1][0]) / 2.0
+        self.grips.get(grip.0).map_or(0.0, |joined| self.both_slid(&joined.grip)[0])
     }
 
     /// How fast they open, m/s.
     pub fn opening(&self, grip: GripId) -> f64 {
-        let Some(joined) = self.grips.get(grip.0) else { return 0.0 };
-        let all = joined.grip.fingers.map(|finger| self.slid(&joined.grip, &finger));
-        (all[0][1] + all[1][1]) / 2.0
+        self.grips.get(grip.0).map_or(0.0, |joined| self.both_slid(&joined.grip)[1])
     }
 
     /// How hard each finger presses on a body, N.
@@ -117,6 +113,12 @@ impl World {
             .grip
             .fingers
             .map(|finger| touches.iter().filter(|t| t.by == finger.body).map(|t| t.pressed()).fold(0.0, |a, b| a + b))
+    }
+
+    /// Where the fingers are and how fast they open, m and m/s: the mean of both.
+    fn both_slid(&self, grip: &Grip) -> [f64; 2] {
+        let [one, other] = grip.fingers.map(|finger| self.slid(grip, &finger));
+        [0, 1].map(|k| (one[k] + other[k]) / 2.0)
     }
 
     /// Where a finger is on its axis and how fast it goes, seen from the hand, m and m/s.
@@ -135,8 +137,7 @@ impl World {
     pub(crate) fn press(&mut self) {
         for index in 0..self.grips.len() {
             let Joined { grip, joints, goal: [goal, speed] } = self.grips[index];
-            let slid = grip.fingers.map(|finger| self.slid(&grip, &finger));
-            let (at, going) = ((slid[0][0] + slid[1][0]) / 2.0, (slid[0][1] + slid[1][1]) / 2.0);
+            let [at, going] = self.both_slid(&grip);
             let Some(hand) = self.handle(grip.hand).and_then(|handle| self.bodies.get(handle)) else { continue };
             let (turned, then) = (hand.position().rotation, hand.next_position().rotation);
             let spin = (then * turned.inverse()).to_scaled_axis() / STEP;

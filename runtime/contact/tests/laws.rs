@@ -165,30 +165,31 @@ fn stacks_stand_and_press_with_what_is_above() {
     assert!(world.is_asleep(), "it sleeps when nothing moves");
 }
 
+/// A hand that looks down, and its two fingers: blocks of a size that are so far open, m.
+fn hand(world: &mut World, above: Pose, pad: [f64; 3], at: f64, friction: f64) -> (Id, [Finger; 2]) {
+    let still =
+        |at, kind| Thing { parts: Vec::new(), outside: Vec::new(), at, kind, friction, bounce: 0.0, robot: true };
+    let hand = world.add(&still(above, Kind::Led));
+    let inner = Pose::at([0.0, pad[1] / 2.0, 0.0]);
+    let own = inertial(&Shape::Box(pad), 0.03);
+    let pad = body(&Shape::Box(pad));
+    let fingers = [0.0, std::f64::consts::PI].map(|about| {
+        let origin = Pose::turned([0.0, 0.0, -0.1], [0.0, 0.0, about]);
+        let kind = Kind::Loose(Inertial { placement: inner.then(own.placement), ..own });
+        let pose = above.then(origin).then(Pose::at([0.0, at, 0.0]));
+        let body = world.add(&Thing { parts: vec![(inner, &pad)], ..still(pose, kind) });
+        Finger { body, origin, axis: [0.0, 1.0, 0.0], at, range: [0.0, 0.04] }
+    });
+    (hand, fingers)
+}
+
 /// A hand that looks down on a block of some width between its fingers, above nothing.
 fn pinched(mass: f64, force: f64, friction: f64) -> (World, GripId, Id) {
     let mut world = World::new();
-    let still =
-        |at, kind| Thing { parts: Vec::new(), outside: Vec::new(), at, kind, friction, bounce: 0.0, robot: true };
-    let hand = world.add(&still(Pose::up(0.3), Kind::Led));
-    let pad = Shape::Box([0.018, 0.01, 0.03]);
-    let own = inertial(&pad, 0.03);
-    let pad = body(&pad);
-    let mut fingers = Vec::new();
-    for side in [1.0, -1.0] {
-        let turn = if side > 0.0 { 0.0 } else { std::f64::consts::PI };
-        let origin = Pose::turned([0.0, 0.0, -0.1], [0.0, 0.0, turn]);
-        let inner = Pose::at([0.0, 0.005, 0.0]);
-        let at = 0.025;
-        let pose = Pose::up(0.3).then(origin).then(Pose::at([0.0, at, 0.0]));
-        let kind = Kind::Loose(Inertial { placement: inner.then(own.placement), ..own });
-        let finger = world.add(&Thing { parts: vec![(inner, &pad)], outside: Vec::new(), ..still(pose, kind) });
-        fingers.push(Finger { body: finger, origin, axis: [0.0, 1.0, 0.0], at, range: [0.0, 0.04] });
-    }
+    let (hand, fingers) = hand(&mut world, Pose::up(0.3), [0.018, 0.01, 0.03], 0.025, friction);
     let block = Shape::Box([0.03, 0.04, 0.05]);
     let item = add(&mut world, &loose(&block, mass, Pose::up(0.19), 1.0));
-    let grip =
-        world.gripper(Grip { hand, fingers: [fingers[0], fingers[1]], force, speed: 0.2 }).expect("it has fingers");
+    let grip = world.gripper(Grip { hand, fingers, force, speed: 0.2 }).expect("it has fingers");
     // Held from below until the fingers press.
     let table = Shape::Box([0.2, 0.2, 0.1]);
     let table = world.add(&Thing {
@@ -339,29 +340,8 @@ fn friction_of_a_pair_stands_above_that_of_its_surfaces() {
 fn pinched_vial(force: f64, friction: f64, turn: f64) -> (f64, f64, [f64; 2]) {
     let mut world = World::new();
     world.floor(0.5);
-    let still = |at, kind, friction| Thing {
-        parts: Vec::new(),
-        outside: Vec::new(),
-        at,
-        kind,
-        friction,
-        bounce: 0.0,
-        robot: true,
-    };
-    let hand = world.add(&still(Pose::turned([0.0, 0.0, 0.14], [0.0, 0.0, turn]), Kind::Led, friction));
-    let pad = Shape::Box([0.0175, 0.019, 0.031]);
-    let own = inertial(&pad, 0.03);
-    let pad = body(&pad);
-    let mut fingers = Vec::new();
-    for side in [1.0, -1.0] {
-        let about = if side > 0.0 { 0.0 } else { std::f64::consts::PI };
-        let origin = Pose::turned([0.0, 0.0, -0.1], [0.0, 0.0, about]);
-        let inner = Pose::at([0.0, 0.0095, 0.0]);
-        let pose = Pose::turned([0.0, 0.0, 0.14], [0.0, 0.0, turn]).then(origin).then(Pose::at([0.0, 0.012, 0.0]));
-        let kind = Kind::Loose(Inertial { placement: inner.then(own.placement), ..own });
-        let finger = world.add(&Thing { parts: vec![(inner, &pad)], ..still(pose, kind, friction) });
-        fingers.push(Finger { body: finger, origin, axis: [0.0, 1.0, 0.0], at: 0.012, range: [0.0, 0.04] });
-    }
+    let above = Pose::turned([0.0, 0.0, 0.14], [0.0, 0.0, turn]);
+    let (hand, fingers) = hand(&mut world, above, [0.0175, 0.019, 0.031], 0.012, friction);
     let vial = Shape::Cylinder([0.017, 0.061]);
     let (form, felt) = (body(&vial), Body::outside([(&vial, Pose::IDENTITY)]).expect("it has a form"));
     let kind = Kind::Loose(inertial(&vial, 0.013));
@@ -369,7 +349,7 @@ fn pinched_vial(force: f64, friction: f64, turn: f64) -> (f64, f64, [f64; 2]) {
     let parts = vec![(Pose::IDENTITY, &form)];
     let outside = vec![(Pose::IDENTITY, &felt)];
     let item = world.add(&Thing { parts, outside, at, kind, friction: 0.4, bounce: 0.0, robot: false });
-    let grip = Grip { hand, fingers: [fingers[0], fingers[1]], force, speed: 0.2 };
+    let grip = Grip { hand, fingers, force, speed: 0.2 };
     let grip = world.gripper(grip).expect("it has fingers");
     let mut to = 0.012;
     for k in 0..1000u32 {
@@ -382,7 +362,7 @@ fn pinched_vial(force: f64, friction: f64, turn: f64) -> (f64, f64, [f64; 2]) {
     }
     let seen = world.pose(hand).inverse().then(world.pose(item));
     let up = world.pose(item).then(Pose::up(1.0)).position[2] - world.pose(item).position[2];
-    let before = Pose::turned([0.0, 0.0, 0.14], [0.0, 0.0, turn]).inverse().then(at).position;
+    let before = above.inverse().then(at).position;
     (up.min(1.0).acos(), far(seen.position, before), world.pinch(grip, item))
 }
 

@@ -145,6 +145,21 @@ pub trait Line {
     /// Something was done: what was heard before it says nothing of what is now.
     fn forget_heard(&mut self) {}
 
+    /// What a line of the driver tells, SI: asked for, or heard.
+    fn tell(
+        &mut self,
+        line: usize,
+        text: &str,
+        told: &Told,
+        driver: &Driver,
+        ear: &mut dyn WireTap,
+    ) -> Result<f64, DeviceError> {
+        match told.heard {
+            Some(_) => self.hear(line, driver, ear),
+            None => self.ask(text, told, driver, ear),
+        }
+    }
+
     /// Lets go by what may still come in answer to a question that is given up, before it is put again.
     fn settle(&mut self, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         Ok(())
@@ -260,8 +275,7 @@ impl Link {
         let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
         let (debt, asked, is_again) = (port.debt(), (String::new(), Duration::ZERO), false);
         let (done, emptied, gone) = (Duration::ZERO, Duration::ZERO, None);
-        let heard_lines = driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some());
-        let by_itself = heard_lines.map(|(line, told)| (line, told.clone())).collect();
+        let by_itself = driver.heard().map(|(line, told)| (line, told.clone())).collect();
         let (ignored, own) = (driver.ignores.clone(), driver.instance);
         Ok(Link {
             world,

@@ -121,16 +121,16 @@ fn number(unit: &Unit, form: &Form, shown: Shown) -> Result<String, String> {
     }
 }
 
-/// A reply that looks like this: 1 for a number, the first of the words, a letter for anything.
-pub fn example(pattern: &Pattern) -> String {
-    let slot = |slot: &Slot| match slot {
-        Slot::Plain(text) => text.clone(),
-        Slot::Number(unit, form) => form.write(unit.of_si(unit.to_si(1.0))).unwrap_or_else(|_| "1".to_owned()),
-        Slot::Word(choices) => choices.iter().find_map(|c| c.sent.clone()).unwrap_or_default(),
-        Slot::Skip(width) => "x".repeat((*width).into()),
-        Slot::Kept(_) | Slot::Any => "x".to_owned(),
-    };
-    pattern.slots.iter().map(slot).collect()
+/// A reply that looks like this: 1 for a number, the first of the words. In words why there is none.
+pub fn example(pattern: &Pattern) -> Result<String, String> {
+    rendered(pattern, |slot| {
+        let value = match slot {
+            Slot::Number(unit, _) => unit.to_si(1.0),
+            Slot::Word(choices) => choices.iter().find(|c| c.sent.is_some()).map_or(0.0, |c| c.index.into()),
+            Slot::Plain(_) | Slot::Skip(_) | Slot::Kept(_) | Slot::Any => 0.0,
+        };
+        Shown { value, digits: None }
+    })
 }
 
 /// The pattern as it was written, for messages.

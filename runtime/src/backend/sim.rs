@@ -291,7 +291,7 @@ impl<'m> Sim<'m> {
         stage.burden(held.map(|load| (load.instance, Burden::of(load, value))).collect::<Vec<_>>());
         stage.keep_time(tempi(&self.prepared.model.paces, |node| Some(self.engine.eval(node))));
         let now = self.engine.time();
-        let before = self.unseen.as_ref().map(|_| stage.clone());
+        let before = self.unseen.as_ref().filter(|_| self.matter.is_none()).map(|_| stage.clone());
         let performed = stage.set_out(&motion, &values)?;
         if self.matter.is_some() {
             return Ok(self.set_about(&motion, performed.as_ref()));

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_contact::{Finger, Grip, GripId, Id, Kind, Thing, World};
+use matterix_contact::{Finger, Grip, Id, Kind, Thing, World};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::{Inertial, Joint, JointKind};
 use matterix_ir::scene::{InstanceId, frame};
@@ -300,6 +300,3 @@ fn is_loose(stage: &Stage<'_>, id: InstanceId) -> bool {
         && instance.articulation.is_none()
         && !matches!(carried, Some(Carried::Held(..)) | None)
 }
-
-/// The gripper's body by which one is told which it is.
-pub(super) type Gripper = GripId;

@@ -4,6 +4,7 @@ use matterix_contact::{GRAVITY, Id};
 use matterix_ir::math::acos;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
+use matterix_motion::pose::{distance, pose};
 
 use super::{Event, Found, Hold, Matter, PATIENCE, Verdict};
 use crate::motion::Stage;
@@ -84,16 +85,13 @@ impl Matter<'_> {
         None
     }
 
-    /// Whether a robot has to do with a thing, or with what bears it: its own step says what becomes of that.
+    /// Whether a robot has to do with a thing: its own step says what becomes of that.
     fn is_handled(&self, id: InstanceId) -> bool {
-        let mine = |id: InstanceId| {
-            self.machines.values().any(|machine| {
-                let held = machine.held.is_some_and(|held| held.item == id);
-                let underway = machine.underway.as_ref();
-                held || underway.is_some_and(|u| u.grips == Some(id) || u.frees.is_some_and(|(item, _)| item == id))
-            })
-        };
-        mine(id)
+        self.machines.values().any(|machine| {
+            let held = machine.held.is_some_and(|held| held.item == id);
+            let underway = machine.underway.as_ref();
+            held || underway.is_some_and(|u| u.grips == Some(id) || u.frees.is_some_and(|(item, _)| item == id))
+        })
     }
 
     fn only_robot(&self) -> Option<InstanceId> {
@@ -305,9 +303,7 @@ const SEEN: (f64, f64) = (2e-4, 2e-3);
 
 /// How far apart two places are, m, and how much turned, rad.
 fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
-    let far = (0..3).map(|k| (a.position[k] - b.position[k]).powi(2)).sum::<f64>().sqrt();
-    let dot: f64 = a.rotation.iter().zip(b.rotation).map(|(a, b)| a * b).sum();
-    (far, 2.0 * acos(dot.abs().min(1.0)))
+    distance(&pose(a), &pose(b))
 }
 
 /// The angle between the upright axes of two places, rad.

@@ -12,7 +12,7 @@ mod story;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_contact::{Id, STEP, Touch, World};
+use matterix_contact::{GripId, Id, STEP, Touch, World};
 use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Inertial;
@@ -131,7 +131,7 @@ struct Machine {
 /// Fingers.
 #[derive(Clone, Debug)]
 struct Hand {
-    grip: build::Gripper,
+    grip: GripId,
     fingers: [Id; 2],
     /// Their variables.
     joints: Vec<usize>,

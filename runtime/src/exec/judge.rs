@@ -50,11 +50,9 @@ impl Executor<'_, '_> {
 
     /// Whether a thing is as it should be at the end; none where that cannot be known.
     pub(super) fn ended(&mut self, condition: &Condition) -> Result<Option<bool>, Fault> {
-        let value = self.backend.ended(condition.node, self.out).map_err(|f| at(f, condition.span))?;
-        if value.is_some() {
-            self.backend.defined(condition.node).map_err(|f| at(f, condition.span))?;
-        }
-        Ok(value.map(truth))
+        let value = self.backend.ended(condition.node, self.out);
+        let value = value.and_then(|value| self.defined(condition.node, value));
+        Ok(value.map_err(|f| at(f, condition.span))?.map(truth))
     }
 
     /// Whether a condition holds; one that cannot be known is assumed to.
@@ -74,6 +72,11 @@ impl Executor<'_, '_> {
     /// The value of a condition; fails where a number that is none decides.
     fn defined_value(&mut self, node: NodeId) -> Result<Option<f64>, Fault> {
         let value = self.backend.value(node, self.out)?;
+        self.defined(node, value)
+    }
+
+    /// A value of a node, where it is none that is no number.
+    fn defined(&mut self, node: NodeId, value: Option<f64>) -> Result<Option<f64>, Fault> {
         if value.is_some() {
             self.backend.defined(node)?;
         }

@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::faulty::{is_safe, plate};
 use super::stop::{signal, terminal};
 use super::{Answer, Device, Emulated, bench, deploy, lines};
-use crate::harness::{command, matterixc_in, write};
+use crate::harness::{command, flat, matterixc_in, write};
 
 /// Seconds of lab time per second.
 const SPEED: &str = "10";
@@ -283,7 +283,7 @@ workflow warm in bench {
     room.until("\"asked\"", 2);
     room.types("n\n");
     let left = room.end();
-    let said = left.said.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&left.said);
     assert_eq!(left.code, Some(1), "{said}");
     assert!(said.contains("`bath`: it was set by hand, and nobody confirmed `stop heating bath`"), "{said}");
     began(&left.journal, "stop stirring plate");

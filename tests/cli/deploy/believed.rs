@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::{Answer, Device, bench, deploy_at};
-use crate::harness::{Ended, write};
+use crate::harness::{Ended, flat, write};
 
 /// A pump and a plate that tell what they do; each says who it is.
 const LAB: &str = "mtx 1
@@ -32,10 +32,6 @@ lab bench { ambient: 22 degC, pump = MyDoser at (1, 0, 0) m, other = MyDoser at 
 workflow go in bench { run pump; wait 500 ms; rest pump }
 workflow breaks in bench { run pump; wait 200 ms; expect pump.going; rest pump; run other; run other; rest other }
 ";
-
-fn flat(ended: &Ended) -> String {
-    ended.err.split_whitespace().collect::<Vec<_>>().join(" ")
-}
 
 /// Runs a workflow of the lab on a pump and another one.
 fn goes(dir: &Path, workflow: &str, pump: &str, other: &str, more: &str) -> Ended {
@@ -72,7 +68,7 @@ fn a_device_that_goes_on_after_it_took_safe_is_named() {
     let text = LAB.replace("expect pump.going; rest pump; ", "");
     write(&dir, "lab.mtx", text);
     let ended = goes(&dir, "breaks", &pump.address, &other.address, "");
-    let said = flat(&ended);
+    let said = flat(&ended.err);
     assert_eq!(ended.code, 1, "{said}");
     let wanted =
         "could not be made safe: `pump`: it took what makes it safe, and still is left pumping by what it tells";
@@ -91,7 +87,7 @@ fn what_is_known_of_the_end_decides_whether_a_device_is_safe() {
         .replace("ends not going", "ends not (going or warm)");
     write(&dir, "lab.mtx", text);
     let ended = goes(&dir, "breaks", &pump.address, &other.address, "");
-    let said = flat(&ended);
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("could not be made safe: `pump`: it took what makes it safe"), "{said}");
 }
 
@@ -130,7 +126,7 @@ workflow go in bench { heat f; wait 300 ms; cool f }
     });
     let dir = bench("believed_shown", FURNACE, "f", &device.address);
     let ended = deploy_at("1", &dir, &["--mode", "real"]);
-    let said = flat(&ended);
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("`f` is left hot"), "{said}");
     assert!(said.contains("could not be made safe: `f`: it took what makes it safe, and still is left hot"), "{said}");
 }
@@ -155,7 +151,7 @@ workflow go in bench { let a = h.left.temperature; note \"{a}\" }
 ";
     let dir = bench("believed_alike", HOSTED, "h", "localhost:1");
     let ended = deploy_at("1", &dir, &[]);
-    let said = flat(&ended);
+    let said = flat(&ended.err);
     let wanted = "`T={degC}`, which `TipLine` expects, cannot be told from what `HostLine` says by itself";
     assert!(ended.code == 1 && said.contains(wanted), "{said}");
     write(&dir, "lab.mtx", HOSTED.replace("expects \"T=", "expects \"A="));
@@ -202,7 +198,7 @@ fn whoever_shares_a_line_that_was_opened_anew_is_asked_too() {
     let bindings = format!("[pump]\naddress = \"{address}\"\n[other]\naddress = \"{address}\"\nunit = \"2\"\n");
     write(&dir, "lab.toml", bindings);
     let ended = deploy_at("1", &dir, &["--mode", "real", "--workflow", "go"]);
-    let said = flat(&ended);
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("could not be made safe: `other`: it says that it is `ZZ`"), "{said}");
     let heard = heard.lock().expect("not poisoned");
     let later: Vec<&str> = heard.iter().filter(|(turn, _)| *turn > 0).map(|(_, line)| line.as_str()).collect();
@@ -222,7 +218,7 @@ fn a_device_that_is_on_at_the_end_is_made_safe() {
     let dir =
         bench("believed_end", &LAB.replace("reading going asks", "reading going while not going asks"), "pump", "");
     let ended = goes(&dir, "go", &pump.address, &other.address, "");
-    let said = flat(&ended);
+    let said = flat(&ended.err);
     assert!(ended.code == 1, "{said}");
     assert_eq!(pump.heard().iter().filter(|line| *line == "H").count(), 2, "{:?} {said}", pump.heard());
 }
@@ -293,7 +289,7 @@ fn another_device_behind_the_line_is_not_made_safe_in_place_of_the_one_that_goes
         let other = doser("ID C\r", |_, _| None);
         let dir = bench(&format!("believed_same_{}", bound.len()), LAB, "pump", "");
         let ended = goes(&dir, "go", &address, &other.address, bound);
-        let said = flat(&ended);
+        let said = flat(&ended.err);
         assert_eq!(ended.code, 1, "{said}");
         assert!(said.contains("could not be made safe: `pump`: it says that it is `B`, and `A`"), "{said}");
         let heard = heard.lock().expect("not poisoned");

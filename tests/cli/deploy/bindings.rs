@@ -1,7 +1,7 @@
 //! Bindings and plans that are refused before anything is sent.
 
 use super::{HEAT, bench};
-use crate::harness::{matterixc_in, write};
+use crate::harness::{flat, matterixc_in, write};
 
 /// Codes and text of the findings of a dry run with these bindings.
 fn found(name: &str, text: &str, bindings: &str) -> String {
@@ -127,7 +127,7 @@ fn a_decision_on_a_device_that_is_not_bound_says_how_to_bind_it() {
         .replace("    plate =", "    scale = PrecisionBalance at (2, 0, 0) m\n    plate =")
         .replace("    wait until", "    let load = scale.weight\n    if load > 1 kg { wait 1 s }\n    wait until");
     let err = found("unasked", &text, "[plate]\nport = \"x\"");
-    let flat = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let flat = flat(&err);
     assert!(err.contains("error[unobserved]") && flat.contains("do not say where `scale` is"), "{err}");
     assert!(err.contains("[scale]\n") && !err.contains("undriven"), "{err}");
 }

@@ -12,7 +12,7 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 
 use super::stop::{signal, terminal};
 use super::{Answer, Device, bench};
-use crate::harness::{command, matterixc_in};
+use crate::harness::{command, flat, matterixc_in};
 
 /// A valve that is on for two seconds, with something said in between.
 const TEXT: &str = "mtx 1
@@ -142,7 +142,7 @@ fn a_process_that_stood_still_does_not_pass() {
     let mut said = String::new();
     process.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
     assert_eq!(process.wait().expect("it ends").code(), Some(1), "{said}");
-    let one_line = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&said);
     assert!(one_line.contains("error[diverged]") && one_line.contains("this program stood still for"), "{said}");
     let report = std::fs::read_to_string(dir.join("record/report.json")).expect("a report");
     assert!(report.contains("\"held_up\": [\n    {"), "{report}");

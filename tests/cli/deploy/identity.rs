@@ -2,7 +2,7 @@
 
 use super::unreached::{Door, SLOW, WEIGH, killed};
 use super::{Answer, Device, bench, deploy, deploy_at, lines};
-use crate::harness::{matterixc_in, write};
+use crate::harness::{flat, matterixc_in, write};
 
 /// A balance with this answer to the question for its serial number.
 fn balance(serial: &'static str) -> Device {
@@ -27,7 +27,7 @@ fn a_journal_is_not_gone_on_with_on_another_device() {
     for _ in 0..2 {
         write(&dir, "lab.toml", format!("[scale]\naddress = \"{}\"\n", second.address));
         let ended = deploy_at(SLOW, &dir, &["--mode", "real", "--resume"]);
-        let flat = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        let flat = flat(&ended.err);
         assert_eq!(ended.code, 1, "{flat}");
         assert!(flat.contains("error[other-device]: `scale` is another device"), "{flat}");
         assert!(flat.contains("`B9034`, and `B9021` was there before"), "{flat}");
@@ -78,7 +78,7 @@ fn a_device_that_the_bindings_name_is_told_from_others() {
         deploy(&dir, &["--mode", "real"])
     };
     let ended = bound(&second);
-    let flat = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let flat = flat(&ended.err);
     assert_eq!(ended.code, 1, "{flat}");
     assert!(
         flat.contains("error[other-device]: `scale`: it says that it is `B9034`, and `B9021` is bound here"),

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::faulty::plate;
 use super::{Answer, Device, bench, deploy};
-use crate::harness::{matterixc_in, write};
+use crate::harness::{flat, matterixc_in, write};
 
 const IN_FINALLY: &str = "mtx 1
 use std::heating::IkaRetControl
@@ -80,7 +80,7 @@ workflow warm in bench {
     let bound = format!("[plate]\naddress = \"{}\"\n[other]\naddress = \"{}\"\n", gone.address, other.address);
     write(&dir, "lab.toml", bound);
     let ended = deploy(&dir, &["--mode", "real", "--yes"]);
-    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&ended.err);
     let named = "a `finally` broke off: `stop stirring other`, `ask \"is it cool?\"` not done";
     assert!(ended.code == 1 && one_line.contains(named), "{one_line}");
     assert!(heard(&other, "STOP_4") > 0, "safe all the same: {:?}", other.heard());
@@ -105,12 +105,12 @@ workflow warm in bench {
     shell.current_dir(&dir).args(["-c", limited]).arg(env!("CARGO_BIN_EXE_matterixc")).args(args);
     let full = shell.stdin(std::process::Stdio::null()).output().expect("bash");
     let err = String::from_utf8_lossy(&full.stderr);
-    let one_line = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&err);
     assert!(one_line.contains("the journal cannot be written") && one_line.contains("begin anew"), "{err}");
     assert!(heard(&device, "STOP_1") > 0, "{:?}", device.heard());
     let started = heard(&device, "START_1");
     let more = crate::harness::matterixc_in(&dir, &[&args[..], &["--resume"]].concat());
-    let one_line = more.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let one_line = flat(&more.err);
     assert!(more.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
     assert_eq!(heard(&device, "START_1"), started, "{:?}", device.heard());
 }
@@ -140,7 +140,7 @@ workflow go in bench { turn go rotor }
         });
         let dir = bench(&format!("left_late_{name}"), ROTOR, "rotor", &device.address);
         let ended = deploy(&dir, &["--mode", "real", "--yes"]);
-        let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        let one_line = flat(&ended.err);
         assert_eq!(ended.code, 1, "{one_line}");
         assert!(heard(&device, "HALT") >= 2, "{:?}", device.heard());
         assert_eq!(one_line.contains("could not be made safe"), is_named, "{name}: {one_line}");

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::faulty::plate;
 use super::{Answer, Device, Emulated, HEAT, bench, deploy};
-use crate::harness::{folder, write};
+use crate::harness::{flat, folder, write};
 
 /// A plate that gets warm with its sixth temperature, and answers its third like this.
 fn third(name: &str, answer: fn() -> Answer) -> (crate::harness::Ended, Vec<String>, String) {
@@ -236,7 +236,7 @@ fn a_device_that_switches_itself_off_while_a_plan_waits_is_noticed() {
     let dir = bench("reads_lazy", LAZY, "box", &device.address);
     let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--record", "record"];
     let ended = crate::harness::matterixc_in(&dir, &given);
-    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("error[diverged]"), "{said}");
     assert!(said.contains("`box.active` is false on the device, not true as it was told"), "{said}");
     assert!(!said.contains("finally"), "it is carried out whole: {said}");
@@ -312,7 +312,7 @@ fn a_late_answer_to_one_question_is_never_that_to_another() {
 #[test]
 fn a_line_that_owes_an_answer_and_is_never_silent_is_named() {
     let ended = slow("restless", &[2100, 60_000], true);
-    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("error[device-garbled]"), "{said}");
     assert!(said.contains("it owes an answer to `T?`, and nothing else is said to it before"), "{said}");
 }

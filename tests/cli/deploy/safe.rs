@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::faulty::{is_safe, plate};
 use super::{Answer, Device, HEAT, SPEED, bench, deploy, deploy_at};
-use crate::harness::{command, matterixc_in, write};
+use crate::harness::{command, flat, matterixc_in, write};
 
 /// Arguments of a deployment on devices.
 const REAL: [&str; 9] =
@@ -208,7 +208,7 @@ fn a_device_whose_driver_does_not_say_how_it_is_made_safe_is_named() {
     let dir = bench("safe_none", OWN, "plate", &device.address);
     let ended = deploy(&dir, &["--mode", "real"]);
     assert_eq!(ended.code, 1);
-    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&ended.err);
     assert!(said.contains("could not be made safe: `plate`: its driver has no line `safe`"), "{}", ended.err);
 }
 
@@ -249,7 +249,7 @@ fn a_watchdog_that_heard_nothing_for_too_long_ends_the_run() {
     });
     let dir = bench("late_feed", &watched("1 s", "5 s"), "plate", &device.address);
     let ended = deploy_at("20", &dir, &["--mode", "real"]);
-    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("diverged") && said.contains("its watchdog waits 5 s"), "{said}");
     assert!(device.heard().iter().any(|line| line == "OFF"), "{:?}", device.heard());
 }

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use serde_json::{Value, json};
 
 use super::{Emulated, deploy};
-use crate::harness::{Ended, folder, matterixc_in, write};
+use crate::harness::{Ended, flat, folder, matterixc_in, write};
 
 /// A transfer on an OT-2, and what its server was asked and answered: recorded by `tests/peers/robot_server.py`, where the run
 /// engine of Opentrons 8.8.2 answers.
@@ -301,7 +301,7 @@ fn what_no_server_understands_is_found_before_anything_is_sent() {
         write(&dir, "lab.mtx", text(line));
         let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
         assert_eq!(ended.code, 1, "{line}");
-        let flat = ended.out.split_whitespace().collect::<Vec<_>>().join(" ");
+        let flat = flat(&ended.out);
         assert!(flat.contains("driver-line") && flat.contains(said), "{line}: {}", ended.out);
     }
     write(

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::kills::pass;
 use super::{Answer, Device, Emulated, bench, deploy, deploy_at, lines};
-use crate::harness::{command, write};
+use crate::harness::{command, flat, write};
 
 /// A port at which nobody listens.
 fn nobody() -> String {
@@ -43,7 +43,7 @@ fn where_one_device_is_not_there_none_is_told_anything() {
         write(&dir, "lab.toml", bound(&plate));
         let ended = deploy(&dir, &["--mode", "real"]);
         assert_eq!(ended.code, 1, "{}", ended.err);
-        let flat = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        let flat = flat(&ended.err);
         assert!(flat.contains("error[device-lost]") && flat.contains(said), "{}", ended.err);
         assert!(ended.err.contains("lab.toml:4:11") && !ended.err.contains("std::"), "{}", ended.err);
         assert!(!ended.err.contains("could not be made safe"), "{}", ended.err);

@@ -16,8 +16,8 @@ pub(super) fn alike(devices: &[Device<'_>]) -> Vec<Diagnostic> {
             continue;
         }
         for answer in expected(driver) {
-            let said = by_itself(of).find(|said| matched(said, &example(answer)).is_some());
-            let Some(said) = said else { continue };
+            let Ok(example) = example(answer) else { continue };
+            let Some(said) = by_itself(of).find(|said| matched(said, &example).is_some()) else { continue };
             let headline = format!(
                 "`{}`, which `{}` expects, cannot be told from what `{}` says by itself",
                 written(answer),
@@ -34,8 +34,7 @@ pub(super) fn alike(devices: &[Device<'_>]) -> Vec<Diagnostic> {
 
 /// What a device says without being asked.
 fn by_itself(driver: &Driver) -> impl Iterator<Item = &Pattern> {
-    let heard = driver.told.iter().filter(|told| told.heard.is_some()).map(|told| &told.expects);
-    heard.chain(&driver.ignores)
+    driver.heard().map(|(_, told)| &told.expects).chain(&driver.ignores)
 }
 
 /// What a driver expects as answers.

@@ -36,24 +36,12 @@ impl Backend for Hardware<'_, '_> {
     }
 
     fn ended(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
-        let model = &self.program.model;
-        let shown = if self.is_dry() { Vec::new() } else { self.observed.shows(model, node) };
-        let readings = shown.into_iter().filter(|n| !self.observed.told.contains_key(n));
-        let readings: Vec<NodeId> = readings.collect();
-        if readings.is_empty() {
+        if self.is_dry() {
             return self.eval(node, out).map(Some);
         }
         // A reading in place of the true value that it shows, as nothing else is known of a device.
-        let all = self.observed.shows(model, node);
-        let mut values = std::collections::BTreeMap::new();
-        for n in all {
-            let teller = if readings.contains(&n) { self.observed.reading_of(model, n) } else { Some(n) };
-            if let Some(teller) = teller {
-                let told = self.told(teller, out)?;
-                values.insert(n, told);
-            }
-        }
-        Ok(Some(self.with_told(node, values)))
+        let shown = self.observed.shows(&self.program.model, node);
+        self.eval_by(node, shown, out).map(Some)
     }
 
     fn observe(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {

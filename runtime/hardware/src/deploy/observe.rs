@@ -10,8 +10,8 @@ use matterix_ir::{NodeId, Op};
 pub struct Observed {
     /// By node: device and line of its driver.
     pub told: BTreeMap<NodeId, (usize, usize)>,
-    /// The same, also of the true values that readings show: what a device is at the end is judged by what it shows.
-    pub shown: BTreeMap<NodeId, (usize, usize)>,
+    /// What is told of a node: itself, or the reading that shows a true value. What a device is at the end is judged by what it shows.
+    shown: BTreeMap<NodeId, NodeId>,
     /// States that change by laws or with transfers.
     hidden: BTreeSet<u32>,
     /// States that change by laws.
@@ -25,58 +25,31 @@ impl Observed {
             model.derivatives.iter().filter(|d| model.graph.constant(d.rate) != Some(0.0)).map(|d| d.state).collect();
         let extensive = model.mixtures.iter().flat_map(|m| m.extensive.iter().map(|(_, state)| *state));
         let hidden = moving.iter().copied().chain(extensive).collect();
-        let readings = told.iter().filter_map(|(node, line)| match model.graph.op(*node) {
-            Op::Reading(r) => Some((model.readings.get(r as usize)?.value, *line)),
-            _ => None,
-        });
-        let mut shown: BTreeMap<NodeId, (usize, usize)> = readings.collect();
-        shown.extend(&told);
+        let mut shown: BTreeMap<NodeId, NodeId> = told.keys().map(|node| (*node, *node)).collect();
+        for node in told.keys() {
+            if let Op::Reading(r) = model.graph.op(*node)
+                && let Some(reading) = model.readings.get(r as usize)
+            {
+                shown.entry(reading.value).or_insert(*node);
+            }
+        }
         Observed { told, shown, hidden, moving }
     }
 
-    /// The outermost nodes in one that devices tell, or show.
-    pub fn shows(&self, model: &Model, node: NodeId) -> Vec<NodeId> {
-        let (mut found, mut seen, mut open) = (Vec::new(), BTreeSet::new(), vec![node]);
-        while let Some(node) = open.pop() {
-            match seen.insert(node) {
-                false => {}
-                true if self.shown.contains_key(&node) => found.push(node),
-                true => open.extend(model.graph.op(node).operands()),
-            }
-        }
-        found.sort_unstable();
-        found
-    }
-
-    /// The reading that shows a true value.
-    pub fn reading_of(&self, model: &Model, value: NodeId) -> Option<NodeId> {
-        let shows = |node: &NodeId| match model.graph.op(*node) {
-            Op::Reading(r) => model.readings.get(r as usize).is_some_and(|reading| reading.value == value),
-            _ => false,
-        };
-        self.told.keys().copied().find(shows)
+    /// The outermost nodes in one that devices show, each with the node that they tell of it.
+    pub fn shows(&self, model: &Model, node: NodeId) -> Vec<(NodeId, NodeId)> {
+        let found = outermost(model, node, &self.shown, |_| ());
+        found.into_iter().map(|node| (node, self.shown[&node])).collect()
     }
 
     /// What a node asks devices for: the outermost told nodes in it, and whether beside them it needs what is only supposed.
     pub fn asks(&self, model: &Model, node: NodeId) -> (Vec<NodeId>, bool) {
-        let (mut told, mut supposed) = (Vec::new(), false);
-        let mut seen = BTreeSet::new();
-        let mut open = vec![node];
-        while let Some(node) = open.pop() {
-            if !seen.insert(node) {
-                continue;
-            }
-            if self.told.contains_key(&node) {
-                told.push(node);
-                continue;
-            }
-            match model.graph.op(node) {
-                Op::State(s) => supposed |= self.hidden.contains(&s),
-                Op::Reading(_) => supposed = true,
-                op => open.extend(op.operands()),
-            }
-        }
-        told.sort_unstable();
+        let mut supposed = false;
+        let told = outermost(model, node, &self.told, |op| match op {
+            Op::State(s) => supposed |= self.hidden.contains(&s),
+            Op::Reading(_) => supposed = true,
+            _ => {}
+        });
         (told, supposed)
     }
 
@@ -88,4 +61,23 @@ impl Observed {
             _ => false,
         })
     }
+}
+
+/// The outermost of these nodes in one, in order; `rest` is given what else it is made of.
+fn outermost<T>(model: &Model, node: NodeId, of: &BTreeMap<NodeId, T>, mut rest: impl FnMut(Op)) -> Vec<NodeId> {
+    let (mut found, mut seen, mut open) = (Vec::new(), BTreeSet::new(), vec![node]);
+    while let Some(node) = open.pop() {
+        if !seen.insert(node) {
+            continue;
+        }
+        if of.contains_key(&node) {
+            found.push(node);
+            continue;
+        }
+        let op = model.graph.op(node);
+        rest(op);
+        open.extend(op.operands());
+    }
+    found.sort_unstable();
+    found
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use matterix_ir::graph::BinaryOp;
-use matterix_ir::wire::{Driver, Framing};
+use matterix_ir::wire::{Driver, Framing, Told};
 use matterix_ir::{NodeId, Op};
 
 use super::hardware::Hardware;
@@ -22,24 +22,20 @@ impl Hardware<'_, '_> {
         {
             return Ok(());
         }
-        let applies = driver.told.iter().find(|told| match told.condition {
-            Some(condition) => self.twin.engine().eval(condition) != 0.0,
-            None => true,
-        });
-        let Some(told) = applies else {
+        let Some(line) = driver.told.iter().position(|told| self.applies(told)) else {
             let why = "nothing that it answers says that it heard what makes it safe".to_owned();
             return Err(DeviceError::Silent(why));
         };
-        let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
-        let line = driver.told.iter().position(|t| std::ptr::eq(t, told)).unwrap_or_default();
-        let asked = self.over(index, |link, driver, ear| match told.heard {
-            Some(_) => link.hear(line, driver, ear),
-            None => link.ask(&text, told, driver, ear),
-        });
-        match asked {
+        match self.tell_once(index, line, &driver.told[line]) {
             Ok(_) | Err(DeviceError::Refused { .. }) => Ok(()),
             Err(other) => Err(other),
         }
+    }
+
+    /// What a line of its driver tells, SI, asked for once.
+    fn tell_once(&mut self, index: usize, line: usize, told: &Told) -> Result<f64, DeviceError> {
+        let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
+        self.over(index, |link, driver, ear| link.tell(line, &text, told, driver, ear))
     }
 
     /// What should hold at the end of a plan holds of a device by what it tells of itself, as far as that decides it: one that took what
@@ -72,16 +68,12 @@ impl Hardware<'_, '_> {
 
     /// The lines of its driver by which a device tells what a condition depends on, where it does so now.
     fn tells(&mut self, index: usize, condition: NodeId) -> Vec<(NodeId, usize)> {
-        let nodes = self.observed.shows(&self.program.model, condition);
-        let of_this = nodes.into_iter().filter_map(|node| match self.observed.shown.get(&node) {
-            Some((device, line)) if *device == index => Some((node, *line)),
-            _ => None,
-        });
-        let applies: Vec<(NodeId, usize)> = of_this.collect();
         let Some(driver) = self.devices[index].driver else { return Vec::new() };
-        let engine = self.twin.engine();
-        let holds = |line: usize| driver.told[line].condition.is_none_or(|c| engine.eval(c) != 0.0);
-        applies.into_iter().filter(|(_, line)| holds(*line)).collect()
+        let shown = self.observed.shows(&self.program.model, condition);
+        let told: Vec<_> = shown.into_iter().map(|(node, teller)| (node, self.observed.told[&teller])).collect();
+        let of_this =
+            told.into_iter().filter(|(_, (device, _))| *device == index).map(|(node, (_, line))| (node, line));
+        of_this.filter(|(_, line)| self.applies(&driver.told[*line])).collect()
     }
 
     /// Whether a condition holds by what a device tells now; nothing where that does not decide it.
@@ -94,13 +86,7 @@ impl Hardware<'_, '_> {
         let Some(driver) = self.devices[index].driver else { return Ok(None) };
         let mut values = BTreeMap::new();
         for (node, line) in told {
-            let told = &driver.told[*line];
-            let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
-            let asked = self.over(index, |link, driver, ear| match told.heard {
-                Some(_) => link.hear(*line, driver, ear),
-                None => link.ask(&text, told, driver, ear),
-            });
-            values.insert(*node, Some(asked?));
+            values.insert(*node, Some(self.tell_once(index, *line, &driver.told[*line])?));
         }
         Ok(self.decided(condition, &mut values).map(|value| value != 0.0))
     }

@@ -157,7 +157,7 @@ impl Hardware<'_, '_> {
         for device in 0..self.devices.len() {
             let Some(driver) = self.devices[device].driver else { continue };
             for (line, told) in driver.told.iter().enumerate() {
-                let holds = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
+                let holds = self.applies(told);
                 let was_set = told.state.is_some_and(|s| self.commanded.contains(&s));
                 let is_unknown = told.state.is_some_and(|s| self.half_said.contains(&s));
                 if !holds || is_unknown || !(was_set || used.contains(&told.value)) {
@@ -194,7 +194,7 @@ impl Hardware<'_, '_> {
             let Some(driver) = self.devices[device].driver.filter(|_| !self.is_dry()) else { continue };
             let is_busy = self.is_busy(device);
             for (line, told) in driver.told.iter().enumerate() {
-                let holds = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
+                let holds = self.applies(told);
                 let was_set = told.state.is_some_and(|s| self.commanded.contains(&s));
                 if holds && was_set && !is_busy && self.observed.is_settled(&self.program.model, told.value) {
                     let value = self.read_again(device, line)?;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use matterix_ir::plan::{Operation, StepId};
-use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Template};
+use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Template, Told};
 use matterix_ir::{Span, codes, message};
 use matterix_runtime::backend::{Backend, Ticket};
 use matterix_runtime::fault::Fault;
@@ -68,10 +68,8 @@ impl<'m> Hardware<'m, '_> {
             return Ok(Vec::new());
         }
         let line = self.line_of(index);
-        if self.devices[line].said {
-            // Over a line that was opened anew another device may answer. Before anything was said, all were asked.
-            self.same(index).map_err(|(_, trouble, _)| trouble)?;
-        }
+        // Over a line that was opened anew another device may answer.
+        self.same(index).map_err(|(_, trouble, _)| trouble)?;
         self.devices[line].said = true;
         self.devices[index].told = true;
         self.settings.exposed.told(self.devices[line].name);
@@ -173,7 +171,7 @@ impl<'m> Hardware<'m, '_> {
     /// Takes in what devices say by themselves; it is in the journal where it is asked for.
     pub(super) fn take_in(&mut self) {
         for index in 0..self.devices.len() {
-            let speaks_up = self.devices[index].driver.is_some_and(|d| d.told.iter().any(|told| told.heard.is_some()));
+            let speaks_up = self.devices[index].driver.is_some_and(|d| d.heard().next().is_some());
             if !speaks_up || self.devices[self.line_of(index)].link.is_none() {
                 continue;
             }
@@ -190,12 +188,15 @@ impl<'m> Hardware<'m, '_> {
         self.devices.iter_mut().filter_map(|device| device.link.as_mut()).for_each(|link| link.forget_heard());
     }
 
+    /// Whether a device tells this now, by its driver.
+    pub(super) fn applies(&mut self, told: &Told) -> bool {
+        told.condition.is_none_or(|condition| self.twin.engine().eval(condition) != 0.0)
+    }
+
     /// Asks a device for a quantity, SI.
     pub(super) fn tell(&mut self, index: usize, line: usize) -> Result<f64, Fault> {
         let Some(told) = self.devices[index].driver.and_then(|d| d.told.get(line)) else { return Ok(f64::NAN) };
-        if let Some(condition) = told.condition
-            && self.twin.engine().eval(condition) == 0.0
-        {
+        if !self.applies(told) {
             let message = format!("`{}` cannot be told now: its driver says so", told.name);
             return Err(self.fault(codes::DEVICE_REFUSED, told.span, message));
         }
@@ -211,13 +212,8 @@ impl<'m> Hardware<'m, '_> {
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        if self.devices[self.line_of(index)].said && self.devices[self.line_of(index)].link.is_some() {
-            self.same(index).map_err(|(_, trouble, at)| self.trouble(index, &trouble, at))?;
-        }
-        let asked = self.inquire(index, |link, driver, ear| match told.heard {
-            Some(_) => link.hear(line, driver, ear),
-            None => link.ask(&text, told, driver, ear),
-        });
+        self.same(index).map_err(|(_, trouble, at)| self.trouble(index, &trouble, at))?;
+        let asked = self.inquire(index, |link, driver, ear| link.tell(line, &text, told, driver, ear));
         asked.map_err(|trouble| self.trouble(index, &trouble, told.span))
     }
 
@@ -293,7 +289,7 @@ impl<'m> Hardware<'m, '_> {
     pub(super) fn read_back(&mut self, device: usize, set: &[u32], moved: bool) -> Result<(), Fault> {
         let Some(driver) = self.devices[device].driver.filter(|_| !self.is_dry()) else { return Ok(()) };
         for (line, told) in driver.told.iter().enumerate() {
-            let applies = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
+            let applies = self.applies(told);
             let concerned = told.state.map_or(moved, |s| set.contains(&s));
             if told.reading.is_some()
                 || !applies

@@ -53,10 +53,19 @@ impl Hardware<'_, '_> {
     /// The value of a node with what devices tell in place of what the twin supposes.
     pub(super) fn eval(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<f64, Fault> {
         let (asked, _) = self.observed.asks(&self.program.model, node);
+        self.eval_by(node, asked.into_iter().map(|told| (told, told)), out)
+    }
+
+    /// The same with what devices tell of some nodes: each with the node that is told.
+    pub(super) fn eval_by(
+        &mut self,
+        node: NodeId,
+        tellers: impl IntoIterator<Item = (NodeId, NodeId)>,
+        out: &mut dyn Listener,
+    ) -> Result<f64, Fault> {
         let mut values: BTreeMap<NodeId, f64> = BTreeMap::new();
-        for told in asked {
-            let value = self.told(told, out)?;
-            values.insert(told, value);
+        for (node, teller) in tellers {
+            values.insert(node, self.told(teller, out)?);
         }
         if values.is_empty() {
             return Ok(self.twin.value(node, out)?.unwrap_or(f64::NAN));
@@ -65,7 +74,7 @@ impl Hardware<'_, '_> {
     }
 
     /// The value of a node with these in place of what the twin supposes.
-    pub(super) fn with_told(&mut self, node: NodeId, mut values: BTreeMap<NodeId, f64>) -> f64 {
+    fn with_told(&mut self, node: NodeId, mut values: BTreeMap<NodeId, f64>) -> f64 {
         let graph = &self.program.model.graph;
         let engine = self.twin.engine();
         for n in graph.schedule([node]) {

@@ -125,13 +125,7 @@ impl Robots {
                 let load = bodies::Grip { robot: name(&robot), items: items.iter().map(name).collect() };
                 sink.push(self.loads, moment.time, &load)?;
             }
-            let scene = &run.program.scene;
-            let going = replay.along(moment.robot);
-            let transforms: Vec<FrameTransform> =
-                going.into_iter().map(|(id, at)| transform(moment.time, &scene.get(id).name, at)).collect();
-            if !transforms.is_empty() {
-                sink.push(frames, moment.time, &FrameTransforms { transforms })?;
-            }
+            places(run, moment.time, replay.along(moment.robot), sink, frames)?;
         }
         travelled |= self.strays(run, time, sink, frames, replay)?;
         self.burdens(run, time, sink)?;
@@ -150,14 +144,9 @@ impl Robots {
         let first = self.strayed;
         while let Some(stray) = run.recording.strays.get(self.strayed).filter(|stray| stray.time <= time) {
             self.strayed += 1;
-            let going = replay.strayed(stray).into_iter();
-            let scene = &run.program.scene;
-            let transforms: Vec<FrameTransform> =
-                going.map(|(id, at)| transform(stray.time, &scene.get(id).name, at)).collect();
-            if !transforms.is_empty() {
-                sink.push(frames, stray.time, &FrameTransforms { transforms })?;
-            }
-            let touched = bodies::Touched { thing: &scene.get(stray.thing).name, touches: &stray.touches };
+            places(run, stray.time, replay.strayed(stray), sink, frames)?;
+            let thing = &run.program.scene.get(stray.thing).name;
+            let touched = bodies::Touched { thing, touches: &stray.touches };
             sink.push(self.contacts, stray.time, &touched)?;
         }
         Ok(self.strayed > first)
@@ -217,6 +206,19 @@ impl Robots {
             &JointStates { timestamp: Time::new(moment.time), joints: joints.collect() },
         )
     }
+}
+
+/// Writes where these are from now on.
+fn places<W: Write + Seek>(
+    run: &Run<'_>,
+    time: f64,
+    going: Vec<(InstanceId, Pose)>,
+    sink: &mut Sink<W>,
+    frames: u16,
+) -> McapResult<()> {
+    let name = |id: InstanceId| &run.program.scene.get(id).name;
+    let transforms: Vec<FrameTransform> = going.into_iter().map(|(id, at)| transform(time, name(id), at)).collect();
+    if transforms.is_empty() { Ok(()) } else { sink.push(frames, time, &FrameTransforms { transforms }) }
 }
 
 fn transform(time: f64, name: &str, at: Pose) -> FrameTransform {
