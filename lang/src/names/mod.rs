@@ -71,6 +71,7 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         ItemKind::Species { name, .. }
         | ItemKind::Solution { name, .. }
         | ItemKind::Reaction { name, .. }
+        | ItemKind::Equilibrium { name, .. }
         | ItemKind::ReactiveGroup { name, .. }
         | ItemKind::Material { name, .. }
         | ItemKind::Hazard { name, .. }
