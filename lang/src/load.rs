@@ -80,7 +80,7 @@ pub fn load(
 }
 
 /// Which modules the user's files import, directly or through others: data files of the others are not read.
-fn used(modules: &[Arc<Module>]) -> Vec<bool> {
+pub fn used(modules: &[Arc<Module>]) -> Vec<bool> {
     let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
     let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
     while let Some(index) = todo.pop() {

@@ -15,6 +15,7 @@ mod devices;
 mod doc;
 mod emit;
 mod environments;
+mod equilibria;
 mod explain;
 mod faults;
 mod files;

@@ -7,6 +7,7 @@ use super::fields::unknown_fields;
 use super::reactions::check_balance;
 use super::species::{SpeciesTable, field};
 use crate::ast::{Field, ItemKind};
+use crate::load::used;
 use crate::names::Names;
 
 /// The fields of which each gives the constant of an equilibrium.
@@ -47,7 +48,10 @@ pub fn collect<'a>(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<EquilibriumDef<'a>> {
     let mut out: Vec<EquilibriumDef<'a>> = Vec::new();
-    for decl in &names.decls {
+    let is_equilibrium = |decl: &&crate::names::Decl<'a>| matches!(decl.item.kind, ItemKind::Equilibrium { .. });
+    // Those of the library hold where a file asks for them.
+    let used = if names.decls.iter().any(|decl| is_equilibrium(&decl)) { used(names.modules) } else { Vec::new() };
+    for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true)) {
         let ItemKind::Equilibrium { name, reactants, products, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "an equilibrium", diagnostics);
         let left = species.terms(names, decl.module, reactants, diagnostics);

@@ -8,7 +8,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
-use crate::ast::{Expr, Field, FieldValue, MemberKind, NamedExpr};
+use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
 use crate::declare::equilibria::CONSTANTS;
 use crate::declare::species::field;
 use crate::declare::{SpeciesId, Type};
@@ -27,6 +27,9 @@ pub const EQUILIBRIUM: &str = "equilibrium";
 
 /// The option that names the property of species which is their heat capacity.
 pub const CAPACITY: &str = "capacity_by";
+
+/// The first items of that are the heat content and the heat capacity.
+const HEAT_AND_CAPACITY: usize = 2;
 
 /// The equilibria of one mixture.
 #[derive(Debug)]
@@ -229,9 +232,22 @@ impl<'a> Elaborator<'a> {
     /// What the equilibria of a mixture rest on besides its amounts, as its kind declares.
     fn surroundings(&mut self, id: InstanceId) -> Option<Vec<NodeId>> {
         let (option, member) = self.matter_option(id, EQUILIBRIUM)?;
-        let value = self.expr(&option.value, &mut Scope::of_member(id, member));
-        let Value::Tuple(items) = value else { return None };
-        items.iter().map(|item| self.value_node(item)).collect()
+        let ExprKind::Tuple(items, _) = &*option.value.kind else { return None };
+        let none = self.graph.number(0.0);
+        let mut scope = Scope::of_member(id, member);
+        let mut found = Vec::with_capacity(items.len());
+        for (i, item) in items.iter().enumerate() {
+            // At the start the temperature is given, and the heat content follows from it.
+            let is_left_out = i < HEAT_AND_CAPACITY && self.mode().at_start;
+            let node = if is_left_out {
+                none
+            } else {
+                let value = self.expr(item, &mut scope);
+                self.value_node(&value)?
+            };
+            found.push(node);
+        }
+        Some(found)
     }
 
     fn matter_option(&self, id: InstanceId, name: &str) -> Option<(&'a NamedExpr, crate::declare::MemberRef<'a>)> {
@@ -243,7 +259,7 @@ impl<'a> Elaborator<'a> {
     fn capacity_property(&self, id: InstanceId) -> Option<String> {
         let (option, _) = self.matter_option(id, CAPACITY)?;
         match &*option.value.kind {
-            crate::ast::ExprKind::Text(text) => Some(text.clone()),
+            ExprKind::Text(text) => Some(text.clone()),
             _ => None,
         }
     }
