@@ -4,7 +4,7 @@ use matterix_ir::graph::eval_op;
 use matterix_ir::plan::{Plan, Step};
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::{Instance, InstanceId, Shape};
-use matterix_ir::{Env, NodeId, Program, Sources, Span};
+use matterix_ir::{Env, NodeId, Op, Program, Sources, Span};
 
 use crate::bench::{self, Owners, Thing};
 use crate::document::{Contents, DOCUMENT_VERSION, Document, Node, Origin, Series, Source};
