@@ -7,8 +7,7 @@ use super::fields::unknown_fields;
 use super::reactions::check_balance;
 use super::species::{SpeciesTable, field};
 use crate::ast::{Field, ItemKind};
-use crate::load::used;
-use crate::names::Names;
+use crate::names::{Names, used};
 
 /// The fields of which each gives the constant of an equilibrium.
 pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp"];
@@ -131,12 +130,11 @@ fn check_form(
             diagnostics.push(d.help("write the equation of the acid, or give `log_constant` for this one"));
         }
     }
-    if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")) {
-        if dry(left) != 1 || left.iter().any(|(s, n)| !species.get(*s).is_water && *n != 1.0) {
-            let headline = "a solubility product is that of one solid: `AgCl <-> Ag+ + Cl-`";
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
-            diagnostics.push(d.because(f.key.span, "the solubility product stands here"));
-        }
+    let is_one_solid = dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || *n == 1.0);
+    if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")).filter(|_| !is_one_solid) {
+        let headline = "a solubility product is that of one solid: `AgCl <-> Ag+ + Cl-`";
+        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
+        diagnostics.push(d.because(f.key.span, "the solubility product stands here"));
     }
 }
 

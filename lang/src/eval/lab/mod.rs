@@ -51,6 +51,9 @@ use crate::units::Dimension;
 pub use instances::Instance;
 pub use mode::Mode;
 
+/// Systems of equilibria by their species and equations.
+pub type Systems = BTreeMap<(Vec<SpeciesId>, Vec<usize>), Option<Arc<System>>>;
+
 /// A member in one way of looking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MemberKey {
@@ -260,7 +263,7 @@ pub struct Elaborator<'a> {
     /// The equilibria of mixtures that were asked for.
     pub speciations: BTreeMap<InstanceId, Option<Arc<Speciation>>>,
     /// Systems of equilibria by their species and equations.
-    pub systems: BTreeMap<(Vec<SpeciesId>, Vec<usize>), Option<Arc<System>>>,
+    pub systems: Systems,
     /// What evaluations come upon besides values, where somebody asks: see [`Elaborator::observe`].
     pub observed: Option<Box<observed::Observed>>,
     /// Where a call says of what it takes something, and its sources are looked into.
