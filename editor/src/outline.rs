@@ -90,6 +90,7 @@ fn item(item: &Item) -> Option<Symbol> {
         ItemKind::ReactiveGroup { .. } => ("reactive group", SymbolKind::Substance),
         ItemKind::Material { .. } => ("material", SymbolKind::Substance),
         ItemKind::Reaction { .. } => ("reaction", SymbolKind::Reaction),
+        ItemKind::Equilibrium { .. } => ("equilibrium", SymbolKind::Reaction),
         ItemKind::Hazard { .. } => ("hazard", SymbolKind::Law),
         ItemKind::Process(_) => ("process", SymbolKind::Law),
         ItemKind::Event(_) => ("event", SymbolKind::Law),

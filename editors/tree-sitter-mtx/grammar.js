@@ -301,7 +301,7 @@ module.exports = grammar({
       optional(seq('+-', nl($), $._operand)),
     ))),
     reaction: ($) => seq(
-      'reaction', field('name', $.identifier), ':', nl($), $._side, choice('->', '<->'), nl($), $._side,
+      choice('reaction', 'equilibrium'), field('name', $.identifier), ':', nl($), $._side, choice('->', '<->'), nl($), $._side,
       optional($.fields),
     ),
     _side: ($) => seq($._side_term, repeat(seq('+', nl($), $._side_term))),

@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, FileId, Sources, codes};
 use crate::ast::ItemKind;
 use crate::declare::units::declare;
 use crate::loader::Loader;
-use crate::names::{Module, Names, module_candidates};
+use crate::names::{Module, Names, module_candidates, used};
 use crate::parallel::STACK;
 use crate::session::{self, Session};
 use crate::{import, library};
@@ -77,23 +77,6 @@ pub fn load(
         }
     }
     (modules, diagnostics)
-}
-
-/// Which modules the user's files import, directly or through others: data files of the others are not read.
-fn used(modules: &[Arc<Module>]) -> Vec<bool> {
-    let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
-    let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
-    while let Some(index) = todo.pop() {
-        for item in &modules[index].tree.items {
-            let ItemKind::Use { path, names } = &item.kind else { continue };
-            let candidates = module_candidates(path, names.is_some());
-            let found = candidates.iter().find_map(|c| modules.iter().position(|m| m.name == *c));
-            if let Some(found) = found.filter(|f| !std::mem::replace(&mut used[*f], true)) {
-                todo.push(found);
-            }
-        }
-    }
-    used
 }
 
 /// A module with what is wrong with its text.

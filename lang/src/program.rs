@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use matterix_ir::inventory::Inventory;
-use matterix_ir::model::{Content, Load, Mixture, Model, Observable, Pace};
+use matterix_ir::model::{Content, Domain, Load, Mixture, Model, Observable, Pace, State};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
-use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Leaves, Op, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::calibration::{self, Calibration};
@@ -864,9 +864,20 @@ fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
         }
         for s in lab.mixture_species(id) {
             out.extend(concentration(lab, id, s).map(|o| (id, Some(s), o)));
+            out.extend(settled(lab, id, s).map(|o| (id, Some(s), o)));
         }
     }
     out
+}
+
+/// The amount of a species at equilibrium, under the name of its state, which holds what was put there and is called so.
+fn settled(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::declare::SpeciesId) -> Option<Observable> {
+    let node = lab.settled_amount(id, s)?;
+    let state = lab.amounts_in(id).find(|(other, _)| *other == s)?.1;
+    let State { name, domain: Domain::Quantity(unit), .. } = &mut lab.states[state as usize] else { return None };
+    let (shown, unit) = (name.clone(), unit.clone());
+    name.push_str(".put");
+    Some(Observable { name: shown, value: vec![node], unit })
 }
 
 /// The library's first concentration of a species: per mass of mixture, or a mass fraction where counted by mass.
@@ -913,7 +924,7 @@ fn mixture(
         let name = match key.species {
             Some(s) => {
                 if key.matter {
-                    contents.push(Content { species: s.0, state: *state });
+                    contents.push(Content { species: s.0, state: *state, settled: None });
                 }
                 format!("{}[{}#{}]", key.member, lab.tables.species.get(s).name, s.0)
             }
@@ -925,7 +936,14 @@ fn mixture(
     contents.sort_by_key(|c: &Content| c.species);
     let species = |i: u32| observables[i as usize].1.map(|s| s.0);
     let properties = of.iter().copied().filter(|i| species(*i).is_none()).collect();
-    let concentration = |c: &Content| of.iter().copied().find(|i| species(*i) == Some(c.species));
+    let is_settled = |i: &u32| {
+        let Observable { value, .. } = &observables[*i as usize].2;
+        value.first().is_some_and(|node| matches!(lab.graph.op(*node), Op::Solved(..)))
+    };
+    for content in &mut contents {
+        content.settled = of.iter().copied().find(|i| species(*i) == Some(content.species) && is_settled(i));
+    }
+    let concentration = |c: &Content| of.iter().copied().find(|i| species(*i) == Some(c.species) && !is_settled(i));
     let concentrations = contents.iter().filter_map(concentration).collect();
     Mixture { instance: id, extensive, contents, properties, concentrations }
 }

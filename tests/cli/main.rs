@@ -16,6 +16,7 @@ mod devices;
 mod doc;
 mod emit;
 mod environments;
+mod equilibria;
 mod explain;
 mod faults;
 mod files;

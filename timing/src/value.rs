@@ -201,7 +201,7 @@ impl<'g> Known<'g> {
                 Linear::number(value.map_or(Interval::ANY, Interval::exactly))
             }
             Op::Local(i) => locals.get(i as usize).cloned().flatten().unwrap_or_else(unknown),
-            Op::Reading(_) => unknown(),
+            Op::Reading(_) | Op::List(..) | Op::Solved(..) => unknown(),
             Op::Unary(UnaryOp::Neg, a) => at(a).scaled(-1.0),
             Op::Unary(o, a) => Linear::number(exact(a).map_or(Interval::ANY, |a| Interval::exactly(unary(o, a)))),
             Op::Binary(BinaryOp::Add, a, b) => at(a).plus(at(b)),

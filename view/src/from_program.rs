@@ -4,7 +4,7 @@ use matterix_ir::graph::eval_op;
 use matterix_ir::plan::{Plan, Step};
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::{Instance, InstanceId, Shape};
-use matterix_ir::{Env, NodeId, Program, Sources, Span};
+use matterix_ir::{Env, NodeId, Op, Program, Sources, Span};
 
 use crate::bench::{self, Owners, Thing};
 use crate::document::{Contents, DOCUMENT_VERSION, Document, Node, Origin, Series, Source};
@@ -123,7 +123,10 @@ fn evaluate(program: &Program, wanted: Vec<NodeId>, states: &[f64]) -> Vec<f64> 
     let env = Env { time: 0.0, states: &states, params: &params, locals: &locals, readings: &readings };
     let mut values = vec![f64::NAN; model.graph.ops().len()];
     for node in model.graph.schedule(wanted.iter().copied()) {
-        values[node.0 as usize] = eval_op(model.graph.op(node), env, &values);
+        values[node.0 as usize] = match model.graph.op(node) {
+            Op::Solved(call, _) => model.graph.call(call).value(|arg| values[arg.0 as usize]),
+            op => eval_op(op, env, &values),
+        };
     }
     wanted.iter().map(|n| values.get(n.0 as usize).copied().unwrap_or(f64::NAN)).collect()
 }

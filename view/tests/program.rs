@@ -71,7 +71,7 @@ fn program() -> (Program, Sources) {
     model.mixtures = vec![Mixture {
         instance: InstanceId(3),
         extensive: vec![("amount[water]".into(), 0)],
-        contents: vec![Content { species: 0, state: 0 }],
+        contents: vec![Content { species: 0, state: 0, settled: None }],
         properties: vec![0],
         concentrations: Vec::new(),
     }];

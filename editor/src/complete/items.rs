@@ -12,6 +12,7 @@ const ITEMS: &[(&str, &str)] = &[
     ("use", "use $0"),
     ("species", "species ${1:name} { formula: \"${2:H2O}\", density: ${3:1 g/mL}, heat_capacity: ${4:75 J/(mol*K)} }"),
     ("solution", "solution ${1:name} { ${2:NaCl}: ${3:1 g}, water: ${4:99 g} }"),
+    ("equilibrium", "equilibrium ${1:name}: ${2:HA} <-> ${3:H+ + A-} { pka: ${4:4.76} }"),
     ("reaction", "reaction ${1:name}: ${2:A} -> ${3:B} {\n    rate: ${4:0.01 1/s}, order: { ${2:A}: 1 }\n}"),
     ("reactive_group", "reactive_group ${1:name} { title: \"$2\", members: { ${3:species}: any }, source: \"$4\" }"),
     ("material", "material ${1:name} { source: \"$0\" }"),
@@ -93,6 +94,7 @@ const MANY: &[(&str, &str)] = &[
 const FIELDS: &[(&str, &[&str])] = &[
     ("species", &["formula", "smiles", "reactive_groups", "same_as", "dissolves", "by"]),
     ("reaction", &["rate", "order", "valid", "enthalpy", "template", "requires", "reverse", "reverse_order"]),
+    ("equilibrium", &["constant", "log_constant", "pka", "ksp", "pksp", "at", "enthalpy", "valid", "source"]),
     ("reactive_group", &["title", "smarts", "unless", "members", "above", "source"]),
     ("material", &["title", "friction", "source"]),
     ("framing", &["carries", "frame", "request", "reply", "length", "check", "silence"]),
@@ -126,7 +128,7 @@ impl Place<'_> {
             "asset" | "capability" if matches!(last, ":" | ",") => {
                 self.globals(&[Kind::Capability, Kind::Asset], 5, out)
             }
-            "reaction" | "solution" | "incompatible" | "allow"
+            "reaction" | "equilibrium" | "solution" | "incompatible" | "allow"
                 if matches!(last, ":" | "+" | "->" | "<->" | "of" | "with" | "incompatible") =>
             {
                 self.globals(&[Kind::Species, Kind::Group, Kind::Material], 5, out);
@@ -196,7 +198,9 @@ impl Place<'_> {
             }
             return;
         }
-        if matches!(item, "species" | "solution" | "reaction" | "reactive_group" | "incompatible") && begins {
+        if matches!(item, "species" | "solution" | "reaction" | "equilibrium" | "reactive_group" | "incompatible")
+            && begins
+        {
             return self.globals(&[Kind::Species, Kind::Solution], 10, out);
         }
         let named = unnamed(&block.head).len() < block.head.len();

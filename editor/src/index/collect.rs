@@ -251,6 +251,7 @@ fn kind_of(kind: &ItemKind) -> Option<Kind> {
         ItemKind::Species { .. } => Kind::Species,
         ItemKind::Solution { .. } => Kind::Solution,
         ItemKind::Reaction { .. } => Kind::Reaction,
+        ItemKind::Equilibrium { .. } => Kind::Equilibrium,
         ItemKind::ReactiveGroup { .. } => Kind::Group,
         ItemKind::Material { .. } => Kind::Material,
         ItemKind::Hazard { .. } => Kind::Hazard,

@@ -6,9 +6,11 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::equilibrium::{Call, Part, System};
 use crate::math;
 
 /// An operation of a [`Graph`], by its position.
@@ -116,6 +118,11 @@ pub enum Op {
     Binary(BinaryOp, NodeId, NodeId),
     /// The second operand if the first is not 0, else the third. Both are evaluated.
     Select(NodeId, NodeId, NodeId),
+    /// All that a list holds, and one value more: what something that takes many values rests on. Its own value only says whether they
+    /// are the same as before.
+    List(NodeId, NodeId),
+    /// A number of a solution, by its index among the calls of the graph; the operand lists its arguments.
+    Solved(u32, NodeId),
 }
 
 impl Op {
@@ -125,6 +132,8 @@ impl Op {
             Op::Unary(_, a) => ([a; 3], 1),
             Op::Binary(_, a, b) => ([a, b, b], 2),
             Op::Select(a, b, c) => ([a, b, c], 3),
+            Op::List(a, b) => ([a, b, b], 2),
+            Op::Solved(_, a) => ([a; 3], 1),
             _ => ([NodeId(0); 3], 0),
         };
         Operands { list, next: 0, count }
@@ -189,7 +198,7 @@ impl Env<'_> {
             // What a plan does not keep is no number.
             Op::Local(i) => self.locals.get(i as usize).copied().unwrap_or(f64::NAN),
             Op::Reading(i) => self.readings[i as usize],
-            Op::Unary(..) | Op::Binary(..) | Op::Select(..) => f64::NAN,
+            Op::Unary(..) | Op::Binary(..) | Op::Select(..) | Op::List(..) | Op::Solved(..) => f64::NAN,
         }
     }
 }
@@ -221,6 +230,9 @@ impl Leaves {
 #[serde(from = "Ops")]
 pub struct Graph {
     ops: Vec<Op>,
+    /// What [`Op::Solved`] asks for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    calls: Vec<Call>,
     /// By operation, so that asking costs nothing.
     #[serde(skip)]
     leaves: Vec<Leaves>,
@@ -233,22 +245,24 @@ pub struct Graph {
 #[serde(rename = "Graph")]
 struct Ops {
     ops: Vec<Op>,
+    #[serde(default)]
+    calls: Vec<Call>,
 }
 
 impl From<Ops> for Graph {
-    fn from(Ops { ops }: Ops) -> Self {
+    fn from(Ops { ops, calls }: Ops) -> Self {
         let mut graph = Graph { leaves: Vec::with_capacity(ops.len()), ..Graph::default() };
         for op in &ops {
             let leaves = graph.leaves_of(*op);
             graph.leaves.push(leaves);
         }
-        Graph { ops, ..graph }
+        Graph { ops, calls, ..graph }
     }
 }
 
 impl PartialEq for Graph {
     fn eq(&self, other: &Self) -> bool {
-        self.ops == other.ops
+        self.ops == other.ops && self.calls == other.calls
     }
 }
 
@@ -264,6 +278,8 @@ enum Key {
     Unary(UnaryOp, NodeId),
     Binary(BinaryOp, NodeId, NodeId),
     Select(NodeId, NodeId, NodeId),
+    List(NodeId, NodeId),
+    Solved(u32, NodeId),
 }
 
 /// Mixes the few words of a [`Key`]. Programs are not written to make keys collide, and the map is never iterated, so
@@ -306,6 +322,8 @@ fn key(op: Op) -> Key {
         Op::Unary(o, a) => Key::Unary(o, a),
         Op::Binary(o, a, b) => Key::Binary(o, a, b),
         Op::Select(a, b, c) => Key::Select(a, b, c),
+        Op::List(a, b) => Key::List(a, b),
+        Op::Solved(call, list) => Key::Solved(call, list),
     }
 }
 
@@ -354,7 +372,7 @@ impl Graph {
             Op::State(_) => Leaves::STATE,
             Op::Local(_) => Leaves::LOCAL,
             Op::Reading(_) => Leaves::READING,
-            Op::Unary(..) | Op::Binary(..) | Op::Select(..) => {
+            Op::Unary(..) | Op::Binary(..) | Op::Select(..) | Op::List(..) | Op::Solved(..) => {
                 let mut all = 0;
                 for operand in op.operands() {
                     all |= self.leaves.get(operand.0 as usize).map_or(0, |leaves| leaves.0);
@@ -397,6 +415,37 @@ impl Graph {
     /// `if c { a } else { b }`.
     pub fn select(&mut self, c: NodeId, a: NodeId, b: NodeId) -> NodeId {
         self.add(Op::Select(c, a, b))
+    }
+
+    /// A number of the solution of a system for these arguments.
+    pub fn solved(&mut self, system: &Arc<System>, part: Part, args: &Arc<[NodeId]>) -> NodeId {
+        let mut list = self.number(0.0);
+        for arg in args.iter() {
+            list = self.add(Op::List(list, *arg));
+        }
+        let is_same = |call: &Call| {
+            let alike = Arc::ptr_eq(&call.system, system) || call.system == *system;
+            call.part == part && call.args == *args && alike
+        };
+        let known = self.calls.iter().position(is_same);
+        let call = known.unwrap_or_else(|| {
+            self.calls.push(Call { system: system.clone(), part, args: args.clone() });
+            self.calls.len() - 1
+        });
+        self.add(Op::Solved(call as u32, list))
+    }
+
+    /// What [`Op::Solved`] asks for.
+    pub fn call(&self, call: u32) -> &Call {
+        &self.calls[call as usize]
+    }
+
+    /// The value of an operation, given what leaves and operands are worth.
+    fn apply(&self, op: Op, leaf: impl Fn(Op) -> f64, at: impl Fn(NodeId) -> f64) -> f64 {
+        match op {
+            Op::Solved(call, _) => self.call(call).value(at),
+            op => apply(op, leaf, at),
+        }
     }
 
     /// Constants are worked out here; a quotient of nothing stays as it is written, for whoever asks for its value to report.
@@ -462,7 +511,7 @@ impl Graph {
         out.clear();
         out.reserve(self.ops.len());
         for &op in &self.ops {
-            let value = eval_op(op, env, out);
+            let value = self.apply(op, |leaf| env.leaf(leaf), |n| out[n.0 as usize]);
             out.push(value);
         }
     }
@@ -482,7 +531,7 @@ impl Graph {
         let mut values: Vec<f64> = Vec::with_capacity(order.len());
         for n in &order {
             // Operands stand before their user.
-            let value = apply(self.op(*n), &leaf, |o| values[order.partition_point(|other| *other < o)]);
+            let value = self.apply(self.op(*n), &leaf, |o| values[order.partition_point(|other| *other < o)]);
             values.push(value);
         }
         values.last().copied().unwrap_or(f64::NAN)
@@ -549,6 +598,8 @@ impl Graph {
                 Op::Unary(o, a) => writeln!(out, "%{i} = {} %{}", format!("{o:?}").to_lowercase(), a.0),
                 Op::Binary(o, a, b) => writeln!(out, "%{i} = {} %{} %{}", format!("{o:?}").to_lowercase(), a.0, b.0),
                 Op::Select(c, a, b) => writeln!(out, "%{i} = select %{} %{} %{}", c.0, a.0, b.0),
+                Op::List(a, b) => writeln!(out, "%{i} = list %{} %{}", a.0, b.0),
+                Op::Solved(call, a) => writeln!(out, "%{i} = solved {:?} %{}", self.call(*call).part, a.0),
             };
         }
         out
@@ -573,8 +624,20 @@ pub fn apply(op: Op, leaf: impl Fn(Op) -> f64, at: impl Fn(NodeId) -> f64) -> f6
                 at(b)
             }
         }
+        Op::List(a, b) => digest(at(a), at(b)),
         other => leaf(other),
     }
+}
+
+/// A number that is another one where one of two is; none where one is none.
+pub fn digest(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() {
+        return f64::NAN;
+    }
+    let mut mixer = Mixer(0);
+    mixer.write_u64(a.to_bits());
+    mixer.write_u64(b.to_bits());
+    f64::from_bits(mixer.finish() >> 12 | 1f64.to_bits())
 }
 
 /// The value of an operation on one number.

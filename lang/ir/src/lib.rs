@@ -7,6 +7,7 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`undefined`]: expressions that have no value.
+//! - [`equilibrium`]: amounts that follow from conserved totals and constants.
 //! - [`interval`]: operations on all numbers between two.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
@@ -19,6 +20,7 @@
 pub mod bodies;
 pub mod codes;
 pub mod diagnostic;
+pub mod equilibrium;
 pub mod extent;
 pub mod footing;
 pub mod form;

@@ -210,8 +210,11 @@ pub struct Species {
 pub struct Content {
     /// Index into [`Model::species`].
     pub species: u32,
-    /// Index into [`Model::states`]; mol.
+    /// Index into [`Model::states`]; mol. Where equilibria have the species, this is what was put there.
     pub state: u32,
+    /// Index into [`Model::observables`]: what there is of it at equilibrium.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settled: Option<u32>,
 }
 
 /// A mixture: what a transfer takes a fraction of.

@@ -22,6 +22,7 @@ pub fn why(op: Op) -> &'static str {
         Op::Unary(UnaryOp::Ln, _) => "the logarithm of a number that is not above 0",
         Op::Binary(BinaryOp::Pow, ..) => "a power that no number is",
         Op::Select(..) => "a table is read beyond its first or last point",
+        Op::Solved(..) => "no amounts meet the equilibria",
         _ => "it is too large, or endless less endless",
     }
 }
@@ -112,6 +113,7 @@ fn has_gaps(graph: &Graph, op: Op) -> bool {
             !(graph.constant(a).is_some_and(|a| a != 0.0) || graph.constant(b).is_some_and(|b| b != 0.0))
         }
         Op::Binary(BinaryOp::Pow, _, b) => graph.constant(b).is_none_or(|b| b.fract() != 0.0),
+        Op::Solved(..) => true,
         _ => graph.is_table(op),
     }
 }
@@ -162,6 +164,9 @@ impl Search<'_> {
         }
         if let Some(found) = operands.iter().find_map(|n| self.of(*n)) {
             return Some(found);
+        }
+        if matches!(op, Op::Solved(..)) {
+            return known.is_some_and(f64::is_nan).then_some(node);
         }
         let values: Option<Vec<f64>> = operands.iter().map(|n| (self.value)(*n)).collect();
         let values = values?;

@@ -2,6 +2,7 @@
 
 mod lazy;
 
+use crate::equilibrium::Call;
 use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp, binary, unary};
 use crate::interval::{Interval, decided, of_binary, of_select, of_unary};
 
@@ -19,6 +20,10 @@ pub trait Rules {
     fn binary(&self, op: BinaryOp, a: Self::Value, b: Self::Value) -> Option<Self::Value>;
     /// Whether a condition holds, if that is settled: what is not needed then is not worked out.
     fn truth(&self, condition: Self::Value) -> Option<bool>;
+    /// A number of a solution; one that rests on some that are not known is left open where nothing is said here.
+    fn solved(&self, _call: &Call, _args: &[Self::Value]) -> Option<Self::Value> {
+        None
+    }
     /// One of two by a condition that is not settled.
     fn either(&self, _condition: Self::Value, _a: Self::Value, _b: Self::Value) -> Option<Self::Value> {
         None
@@ -45,6 +50,10 @@ impl<L: Fn(Op) -> Option<f64>> Rules for Numbers<L> {
 
     fn truth(&self, condition: f64) -> Option<bool> {
         Some(condition != 0.0)
+    }
+
+    fn solved(&self, call: &Call, args: &[f64]) -> Option<f64> {
+        Some(call.system.value(call.part, args))
     }
 }
 
@@ -73,6 +82,10 @@ impl<L: Fn(Op) -> Interval> Rules for Bounds<L> {
     fn either(&self, condition: Interval, a: Interval, b: Interval) -> Option<Interval> {
         Some(of_select(condition, a, b))
     }
+
+    fn solved(&self, call: &Call, args: &[Interval]) -> Option<Interval> {
+        Some(call.system.bounds(call.part, args))
+    }
 }
 
 /// What a node of a graph is made of, by itself.
@@ -82,6 +95,8 @@ pub struct Formula {
     ops: Box<[Op]>,
     /// What conditions leave out, in the order of the operations.
     skips: Box<[Skip]>,
+    /// What [`Op::Solved`] asks for, its arguments by their position here.
+    calls: Box<[Call]>,
 }
 
 /// Formulas of a graph that does not change any more, each made once.
@@ -107,7 +122,7 @@ impl Formulas {
 
     fn make(&mut self, graph: &Graph, node: NodeId) -> Formula {
         self.number += 1;
-        let mut ops: Vec<Op> = Vec::new();
+        let (mut ops, mut calls): (Vec<Op>, Vec<Call>) = (Vec::new(), Vec::new());
         let mut todo = vec![node];
         while let Some(&next) = todo.last() {
             if self.place(next).is_some() {
@@ -129,13 +144,19 @@ impl Formulas {
                 Op::Unary(op, a) => Op::Unary(op, at(a)),
                 Op::Binary(op, a, b) => Op::Binary(op, at(a), at(b)),
                 Op::Select(c, a, b) => Op::Select(at(c), at(a), at(b)),
+                Op::List(a, b) => Op::List(at(a), at(b)),
+                Op::Solved(call, list) => {
+                    let call = graph.call(call);
+                    calls.push(Call { args: call.args.iter().map(|arg| at(*arg)).collect(), ..call.clone() });
+                    Op::Solved(calls.len() as u32 - 1, at(list))
+                }
                 leaf => leaf,
             };
             self.places[next.0 as usize] = (self.number, ops.len() as u32);
             ops.push(op);
             todo.pop();
         }
-        lazy::formula(ops)
+        lazy::formula(ops, calls)
     }
 
     fn place(&self, node: NodeId) -> Option<u32> {
@@ -175,6 +196,12 @@ impl Formula {
                     Some(false) => at(b)?,
                     None => rules.either(at(c)?, at(a)?, at(b)?)?,
                 },
+                Op::List(..) => R::Value::default(),
+                Op::Solved(call, _) => {
+                    let call = self.calls.get(call as usize)?;
+                    let args: Option<Vec<R::Value>> = call.args.iter().map(|arg| at(*arg)).collect();
+                    rules.solved(call, &args?)?
+                }
                 leaf => rules.leaf(leaf)?,
             };
             *room.get_mut(next)? = value;

@@ -109,6 +109,14 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
                 }
             }
         }
+        ItemKind::Equilibrium { name, .. } => {
+            let equilibria = &lab.tables.equilibria;
+            let is_it = |e: &usize| equilibria[*e].module == module && equilibria[*e].span == name.span;
+            if let Some(e) = (0..equilibria.len()).find(is_it) {
+                lab.check_equilibrium(e);
+                lab.check_circles(e);
+            }
+        }
         ItemKind::Species { .. } => lab.check_species(id),
         ItemKind::Material { fields, .. } => material(lab, fields, module),
         ItemKind::Skill { sig, body, handlers, .. } => {
@@ -182,7 +190,7 @@ fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
                     continue;
                 }
                 let at_start = matches!(role, Role::State | Role::Extensive);
-                let mode = Mode { at_start, reported: *role == Role::Reading };
+                let mode = Mode { at_start, reported: *role == Role::Reading, pooled: false };
                 lab.in_mode(mode, |lab| match *role == Role::Extensive && per.is_some() {
                     true => drop(lab.state_value(this, m, &name.text, &ty, value.as_ref())),
                     false => drop(lab.member_value(this, m, name.span)),

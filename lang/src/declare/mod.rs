@@ -2,6 +2,7 @@
 //! belongs to a lab, and nothing is evaluated.
 
 pub mod compatibility;
+pub mod equilibria;
 pub mod failures;
 pub mod fields;
 pub mod ids;

@@ -64,7 +64,7 @@ pub fn collect<'a>(
     out
 }
 
-fn check_balance(
+pub(super) fn check_balance(
     table: &SpeciesTable<'_>,
     left: &[(super::SpeciesId, f64)],
     right: &[(super::SpeciesId, f64)],

@@ -111,6 +111,8 @@ pub struct Tables<'a> {
     pub species: SpeciesTable<'a>,
     /// Reactions whose species are all known.
     pub reactions: Vec<ReactionDef<'a>>,
+    /// Equilibria whose species are all known.
+    pub equilibria: Vec<super::equilibria::EquilibriumDef<'a>>,
     /// Reactive groups, materials and what must not meet.
     pub screen: Screen,
     /// Whether the check is of no use any more.
@@ -141,6 +143,7 @@ impl<'a> Tables<'a> {
             properties: Properties::new(),
             species: SpeciesTable::default(),
             reactions: Vec::new(),
+            equilibria: Vec::new(),
             screen: Screen::default(),
             stop: Stop::default(),
             processes: Vec::new(),
@@ -162,6 +165,7 @@ impl<'a> Tables<'a> {
         tables.species = SpeciesTable::new(names, &tables.properties, &mut diagnostics);
         tables.screen = compatibility(&tables, &mut diagnostics);
         tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
+        tables.equilibria = super::equilibria::collect(names, &tables.species, &mut diagnostics);
         (tables, diagnostics)
     }
 

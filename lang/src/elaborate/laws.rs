@@ -10,7 +10,7 @@ use super::tuples::Tuples;
 use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
 use crate::declare::tables::MemberRef;
 use crate::declare::{ReactionId, Type};
-use crate::eval::lab::{Contribution, Elaborator, ProcessInstance};
+use crate::eval::lab::{Contribution, Elaborator, Mode, ProcessInstance};
 use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 
@@ -325,7 +325,8 @@ impl<'a> Elaborator<'a> {
             }
             return;
         }
-        let current = self.expr(place, scope);
+        let pooled = Mode { pooled: true, ..self.mode() };
+        let current = self.in_mode(pooled, |lab| lab.expr(place, scope));
         let Value::Num(state) = current else {
             self.expected("a continuous state", &current, place.span);
             return;
@@ -632,7 +633,7 @@ impl<'a> Elaborator<'a> {
         scope: &mut Scope,
     ) -> Option<Action> {
         let place = self.expr(target, scope);
-        let (ty, node) = match &place {
+        let (ty, mut node) = match &place {
             Value::Num(n) => {
                 (Type::Quantity { dimension: n.dimension.clone(), point: n.point, optional: true }, n.node)
             }
@@ -647,6 +648,9 @@ impl<'a> Elaborator<'a> {
         };
         let v = self.typed(value, &ty, scope, "value");
         let mut new = self.value_node(&v)?;
+        if let Some(changed) = self.pooled_change(target, (node, new), scope) {
+            (node, new) = changed;
+        }
         let Op::State(state) = self.graph.op(node) else {
             if !self.prototype && !self.writes(target, new, scope) {
                 self.report(
@@ -665,6 +669,43 @@ impl<'a> Elaborator<'a> {
 }
 
 impl<'a> Elaborator<'a> {
+    /// What an assignment to an amount at equilibrium does to the amount that was put there: it changes by the same.
+    fn pooled_change(
+        &mut self,
+        target: &'a Expr,
+        (settled, new): (NodeId, NodeId),
+        scope: &mut Scope,
+    ) -> Option<(NodeId, NodeId)> {
+        let Op::Solved(..) = self.graph.op(settled) else { return None };
+        let pooled = Mode { pooled: true, ..self.mode() };
+        let Value::Num(put) = self.in_mode(pooled, |lab| lab.expr(target, scope)) else { return None };
+        Some((put.node, self.moved_to(new, settled, put.node)))
+    }
+
+    /// A value that is counted from one number, counted from another one.
+    fn moved_to(&mut self, value: NodeId, from: NodeId, to: NodeId) -> NodeId {
+        match self.graph.op(value) {
+            _ if value == from => to,
+            Op::Binary(op @ (BinaryOp::Add | BinaryOp::Sub), a, b) if self.is_counted_from(a, from) => {
+                let a = self.moved_to(a, from, to);
+                self.graph.binary(op, a, b)
+            }
+            _ => {
+                let change = self.graph.binary(BinaryOp::Sub, value, from);
+                self.graph.binary(BinaryOp::Add, to, change)
+            }
+        }
+    }
+
+    /// Whether a sum begins with a number.
+    fn is_counted_from(&self, value: NodeId, from: NodeId) -> bool {
+        match self.graph.op(value) {
+            _ if value == from => true,
+            Op::Binary(BinaryOp::Add | BinaryOp::Sub, a, _) => self.is_counted_from(a, from),
+            _ => false,
+        }
+    }
+
     /// Checks a process by itself; its parameters are bound in the scope.
     pub fn check_process(&mut self, p: &'a ast::Process, scope: &mut Scope) {
         self.flows_sealed = true;

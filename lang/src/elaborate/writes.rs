@@ -60,6 +60,7 @@ pub fn vanishes(graph: &Graph, node: NodeId, never: &dyn Fn(NodeId) -> bool, zer
             Op::Binary(BinaryOp::Pow, a, b) => look(a) && graph.constant(b).is_some_and(|b| b > 0.0),
             Op::Binary(BinaryOp::Add | BinaryOp::Sub | BinaryOp::Min | BinaryOp::Max, a, b) => look(a) && look(b),
             Op::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq | BinaryOp::And | BinaryOp::Or, ..) => never(*n),
+            Op::List(..) | Op::Solved(..) => false,
             Op::Select(condition, a, b) => (never(condition) || look(a)) && look(b),
         });
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use matterix_ir::equilibrium::Part;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::study::Keep;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
@@ -74,11 +75,29 @@ enum Bound {
     Placed,
     /// Whether one mixture has touched something that another has not.
     Soils,
+    /// The activity of a species at equilibrium.
+    Activity,
+    /// Whether an equilibrium of the file has a species.
+    Balanced,
+    /// The temperature at equilibrium.
+    Settled,
+    /// The ionic strength that equilibria leave.
+    IonicStrength,
+    /// Whether equilibria have constants at the temperature that is there.
+    EquilibriaHold,
+    /// The heat of coming to equilibrium at the start.
+    HeatAtStart,
     /// What is kept of a quantity over a whole run.
     OverTime(Keep),
 }
 
 const TABLE: &[(&str, Bound)] = &[
+    ("activity", Bound::Activity),
+    ("balanced", Bound::Balanced),
+    ("settled_temperature", Bound::Settled),
+    ("settled_strength", Bound::IonicStrength),
+    ("equilibria_hold", Bound::EquilibriaHold),
+    ("heat_at_start", Bound::HeatAtStart),
     ("exp", Bound::Unary(UnaryOp::Exp)),
     ("ln", Bound::Unary(UnaryOp::Ln)),
     ("sin", Bound::Unary(UnaryOp::Sin)),
@@ -244,6 +263,27 @@ impl Elaborator<'_> {
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
+            (Bound::Activity, [Value::Instance(m), Value::Species(s), Value::Num(otherwise)]) => {
+                self.activity_of(*m, *s, otherwise)
+            }
+            (Bound::Balanced, [Value::Species(s)]) => {
+                let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(*s));
+                Value::Bool(self.graph.number(f64::from(u8::from(is_balanced))))
+            }
+            (Bound::Settled, [Value::Instance(m), Value::Num(otherwise)]) => {
+                let node = self.settled(*m, |_| Some(Part::Temperature)).unwrap_or(otherwise.node);
+                Value::Num(Num { node, literal: false, ..otherwise.clone() })
+            }
+            (Bound::IonicStrength, [Value::Instance(m), Value::Num(otherwise)]) => {
+                let node = self.settled(*m, |_| Some(Part::Strength)).unwrap_or(otherwise.node);
+                Value::Num(Num { node, literal: false, ..otherwise.clone() })
+            }
+            (Bound::EquilibriaHold, [Value::Instance(m)]) => Value::Bool(self.equilibria_hold(*m)),
+            (Bound::HeatAtStart, [Value::Instance(m), Value::Num(t)]) => {
+                let node = self.heat_at_start(*m, t.node);
+                let node = node.unwrap_or_else(|| self.graph.number(0.0));
+                self.num(node, self.tables.units.named("Energy"))
+            }
             (Bound::Stated, [Value::Material(id), Value::Text(what)]) => self.stated(*id, what),
             (Bound::Stated, [Value::Nothing, Value::Text(_)]) => Value::Unlimited,
             (Bound::OverTime(keep), [Value::Num(n)]) => self.over_time(*keep, n, name, at),

@@ -730,14 +730,15 @@ impl<'a> Elaborator<'a> {
                 return None;
             }
             let kind = (owner, dimension.clone());
-            if let Some(v) = self.view_values.get(&(id, s)).and_then(|of| of.get(&kind)) {
+            let known = self.view_values.get(&(id, s)).and_then(|of| of.get(&kind));
+            if let Some(v) = known.filter(|_| !self.mode().pooled) {
                 return Some(v.clone());
             }
             let mut scope = Scope::of(id, module);
             scope.bind(param.name.text.clone(), Value::Species(s));
             let v = self.define(|lab| lab.expr(value, &mut scope));
             let v = self.coerce(v, &ty, value.span, "view");
-            if !self.mode().at_start {
+            if !self.mode().at_start && !self.mode().pooled {
                 self.view_values.entry((id, s)).or_default().insert(kind, v.clone());
             }
             return Some(v);
@@ -765,7 +766,10 @@ impl<'a> Elaborator<'a> {
         let index = self.instances[id.0 as usize].amounts.get(member).and_then(|of| of.get(&s)).copied();
         let node = match index {
             Some(i) if self.mode().at_start => self.states[i as usize].initial,
-            Some(i) => self.graph.add(Op::State(i)),
+            Some(i) => match self.is_matter(id, m).then(|| self.settled_amount(id, s)).flatten() {
+                Some(settled) => settled,
+                None => self.graph.add(Op::State(i)),
+            },
             None if self.is_matter(id, m) || self.prototype => self.graph.number(0.0),
             None => return self.begins_with(id, m, &ty),
         };
@@ -793,7 +797,7 @@ impl<'a> Elaborator<'a> {
                 return self.number(f64::from(charge), Dimension::one(), false);
             }
             "splits" => {
-                let splits = f64::from(u8::from(!def.dissolves.is_empty()));
+                let splits = f64::from(u8::from(self.splits(s)));
                 return Value::Bool(self.graph.number(splits));
             }
             "ions" => return Value::List(def.dissolves.iter().map(|(i, _)| Value::Species(*i)).collect()),

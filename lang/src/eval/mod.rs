@@ -7,6 +7,7 @@ pub mod arith;
 pub mod call;
 pub mod coerce;
 pub mod compare;
+pub mod equilibrium;
 pub mod expr;
 pub mod external;
 pub mod lab;

@@ -57,6 +57,23 @@ pub struct Names<'a> {
     own: Vec<BTreeMap<Arc<str>, DeclId>>,
 }
 
+/// Which modules the user's files import, directly or through others: data files of the others are not read.
+pub(crate) fn used(modules: &[Arc<Module>]) -> Vec<bool> {
+    let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
+    let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
+    while let Some(index) = todo.pop() {
+        for item in &modules[index].tree.items {
+            let ItemKind::Use { path, names } = &item.kind else { continue };
+            let candidates = module_candidates(path, names.is_some());
+            let found = candidates.iter().find_map(|c| modules.iter().position(|m| m.name == *c));
+            if let Some(found) = found.filter(|f| !std::mem::replace(&mut used[*f], true)) {
+                todo.push(found);
+            }
+        }
+    }
+    used
+}
+
 /// Module paths a `use` may mean: with braces the path, without them the path or the path less its last segment.
 pub(crate) fn module_candidates(path: &ast::Path, braces: bool) -> Vec<String> {
     let join = |n: usize| path.segments[..n].iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
@@ -71,6 +88,7 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         ItemKind::Species { name, .. }
         | ItemKind::Solution { name, .. }
         | ItemKind::Reaction { name, .. }
+        | ItemKind::Equilibrium { name, .. }
         | ItemKind::ReactiveGroup { name, .. }
         | ItemKind::Material { name, .. }
         | ItemKind::Hazard { name, .. }

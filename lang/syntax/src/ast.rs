@@ -117,6 +117,17 @@ pub enum ItemKind {
         /// Rate, order, window, template, enthalpy.
         fields: Vec<Field>,
     },
+    /// `equilibrium e: HA <-> H+ + A- { pka: 4.756 }`.
+    Equilibrium {
+        /// Its name.
+        name: Name,
+        /// Left side.
+        reactants: Vec<Term>,
+        /// Right side.
+        products: Vec<Term>,
+        /// Its constant, where that holds, its enthalpy.
+        fields: Vec<Field>,
+    },
     /// `reactive_group ketone { smarts: ["[#6][CX3](=O)[#6]"], source: "..." }`.
     ReactiveGroup {
         /// Its name.

@@ -391,6 +391,7 @@ const BLOCK_WORDS: &[&str] = &[
     "species",
     "solution",
     "reaction",
+    "equilibrium",
     "reactive_group",
     "material",
     "incompatible",

@@ -108,6 +108,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_species
             | kw_solution
             | kw_reaction
+            | kw_equilibrium
             | kw_reactive_group
             | kw_material
             | kw_incompatible

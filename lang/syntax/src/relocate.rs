@@ -141,6 +141,7 @@ impl Relocate for ItemKind {
             ItemKind::Reaction { name, reactants, reversible, products, fields } => {
                 each!(put: name reactants reversible products fields)
             }
+            ItemKind::Equilibrium { name, reactants, products, fields } => each!(put: name reactants products fields),
             ItemKind::ReactiveGroup { name, fields } => each!(put: name fields),
             ItemKind::Material { name, fields } => each!(put: name fields),
             ItemKind::Incompatible { a, b, fields } => each!(put: a b fields),

@@ -8,6 +8,7 @@ pub(super) const ITEM_WORDS: &[&str] = &[
     "species",
     "solution",
     "reaction",
+    "equilibrium",
     "reactive_group",
     "material",
     "incompatible",

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::graph::{Env, eval_op};
+use matterix_ir::graph::{Env, digest, eval_op};
 use matterix_ir::{BinaryOp, Graph, Leaves, NodeId, Op};
 
 /// The leaves' values at one instant; `None` is not known.
@@ -20,13 +20,13 @@ pub(crate) struct Known<'a> {
 pub(crate) fn eval(graph: &Graph, node: NodeId, known: Known<'_>) -> Option<f64> {
     let mut values: BTreeMap<NodeId, Option<f64>> = BTreeMap::new();
     for n in graph.schedule(roots(graph, node, known)) {
-        let value = one(graph.op(n), known, &values);
+        let value = one(graph, graph.op(n), known, &values);
         values.insert(n, value);
     }
     // A reading may stand before what it measures; it was not known then.
     if values.get(&node).copied().flatten().is_none() && graph.leaves(node).meets(Leaves::READING) {
         for n in graph.schedule([node]) {
-            let value = one(graph.op(n), known, &values);
+            let value = one(graph, graph.op(n), known, &values);
             values.insert(n, value);
         }
     }
@@ -42,7 +42,7 @@ fn roots(graph: &Graph, node: NodeId, known: Known<'_>) -> Vec<NodeId> {
     std::iter::once(node).chain(measured).collect()
 }
 
-fn one(op: Op, known: Known<'_>, values: &BTreeMap<NodeId, Option<f64>>) -> Option<f64> {
+fn one(graph: &Graph, op: Op, known: Known<'_>, values: &BTreeMap<NodeId, Option<f64>>) -> Option<f64> {
     let at = |n: NodeId| values.get(&n).copied().flatten();
     match op {
         Op::State(i) => known.states.get(i as usize).copied().flatten(),
@@ -51,6 +51,8 @@ fn one(op: Op, known: Known<'_>, values: &BTreeMap<NodeId, Option<f64>>) -> Opti
         Op::Param(i) => known.params.get(i as usize).copied(),
         Op::Time => Some(known.time),
         Op::Const(v) => Some(v),
+        Op::List(a, b) => at(a).zip(at(b)).map(|(a, b)| digest(a, b)),
+        Op::Solved(call, list) => at(list).map(|_| graph.call(call).value(|arg| at(arg).unwrap_or(f64::NAN))),
         Op::Unary(o, a) => at(a).map(|a| apply(Op::Unary(o, NodeId(0)), &[a])),
         Op::Binary(o, a, b) => match (o, at(a), at(b)) {
             (BinaryOp::And, Some(0.0), _) | (BinaryOp::And, _, Some(0.0)) => Some(0.0),

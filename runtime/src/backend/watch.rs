@@ -114,6 +114,12 @@ fn exact(model: &mut Model, node: NodeId) -> NodeId {
             Op::Unary(o, a) => model.graph.add(Op::Unary(o, at(a))),
             Op::Binary(o, a, b) => model.graph.add(Op::Binary(o, at(a), at(b))),
             Op::Select(c, a, b) => model.graph.add(Op::Select(at(c), at(a), at(b))),
+            Op::List(a, b) => model.graph.add(Op::List(at(a), at(b))),
+            Op::Solved(call, _) => {
+                let call = model.graph.call(call).clone();
+                let args = call.args.iter().map(|arg| at(*arg)).collect();
+                model.graph.solved(&call.system, call.part, &args)
+            }
             _ => old,
         };
         copies.insert(old, new);

@@ -7,10 +7,10 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use matterix_ir::graph::{binary, unary};
+use matterix_ir::graph::{binary, digest, unary};
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
-use super::tape::{Step, Tape, Term};
+use super::tape::{Call, Step, Tape, Term};
 
 /// Largest whole number that a term of a sum is a multiple by: its product is exact in two doubles.
 const LARGEST_FACTOR: f64 = 1e6;
@@ -203,8 +203,13 @@ impl Analysis<'_> {
 
     /// The operations that a value is computed from within the segment; none where it is a leaf, or does not change.
     pub(super) fn below(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
-        let operands = self.varies(node).then(|| self.graph.op(node).operands());
-        operands.into_iter().flatten().map(|operand| self.same(operand))
+        // What is solved rests on its arguments themselves, not on their list.
+        let (operands, args) = match self.graph.op(node) {
+            _ if !self.varies(node) => (None, &[][..]),
+            Op::Solved(call, _) => (None, &self.graph.call(call).args[..]),
+            op => (Some(op.operands()), &[][..]),
+        };
+        operands.into_iter().flatten().chain(args.iter().copied()).map(|operand| self.same(operand))
     }
 
     /// The operation that has the value of this one throughout the segment.
@@ -240,7 +245,9 @@ impl Analysis<'_> {
                 fact.rest_on(b);
                 fact.varies &= !op.is_comparison() && !decided(kind, a) && !decided(kind, b);
             }
-            Op::Select(c, a, b) => [c, a, b].into_iter().for_each(|operand| fact.rest_on(self.fact(operand))),
+            Op::Select(..) | Op::List(..) | Op::Solved(..) => {
+                op.operands().for_each(|operand| fact.rest_on(self.fact(operand)));
+            }
             _ => {}
         }
         if let Some(other) = self.passes_on(op) {
@@ -254,6 +261,8 @@ impl Analysis<'_> {
             Op::Binary(BinaryOp::Mul, a, b) if settled(a, b) => 0.0,
             Op::Binary(kind, a, b) => binary(kind, self.now(a), self.now(b)),
             Op::Select(c, a, b) => self.now(if self.now(c) != 0.0 { a } else { b }),
+            Op::List(a, b) => digest(self.now(a), self.now(b)),
+            Op::Solved(call, _) => self.graph.call(call).value(|arg| self.now(arg)),
             other => leaf(other),
         };
         fact
@@ -463,6 +472,12 @@ impl Analysis<'_> {
                 Op::Unary(op, a) => Step::Unary(op, at(a)),
                 Op::Binary(op, a, b) => Step::Binary(op, at(a), at(b)),
                 Op::Select(c, a, b) => Step::Select(at(c), at(a), at(b)),
+                Op::Solved(call, _) => {
+                    let call = self.graph.call(call);
+                    let args = call.args.iter().map(|arg| at(*arg)).collect();
+                    tape.calls.push(Call { system: call.system.clone(), part: call.part, args });
+                    Step::Solved(tape.calls.len() as u32 - 1)
+                }
                 Op::State(s) => {
                     let position = moving.partition_point(|&m| m < s);
                     place[i] = (tape.time() + 1 + position) as u32;

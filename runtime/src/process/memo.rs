@@ -107,9 +107,11 @@ impl Memo {
             }
             if self.todo.len() == before {
                 self.todo.pop();
-                let value = match op.operands().next() {
-                    Some(_) => apply(op, |_| f64::NAN, |o| self.values[o.0 as usize]),
-                    None => self.take(next, leaf(op)),
+                let at = |o: NodeId| self.values[o.0 as usize];
+                let value = match op {
+                    Op::Solved(call, _) => graph.call(call).value(at),
+                    op if op.operands().next().is_some() => apply(op, |_| f64::NAN, at),
+                    op => self.take(next, leaf(op)),
                 };
                 self.keep(next, value);
             }

@@ -49,6 +49,8 @@ enum Code {
     Pairs(u32, u32),
     /// Multiples of many: from this addition on, so many; all slopes are 0 before.
     Sum(u32, u32),
+    /// Those of a solution by its arguments, as the additions number them: from this addition on, so many.
+    Solved(u32, u32),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +98,10 @@ impl Slopes {
                         memory[to + k] = times(a, memory[x as usize]) + times(b, memory[y as usize]);
                     }
                 }
+                Code::Solved(start, count) => {
+                    let additions = &self.additions[start as usize..(start + count) as usize];
+                    solved(tape, step, additions, registers, memory);
+                }
                 Code::Sum(start, count) => {
                     let additions = &self.additions[start as usize..(start + count) as usize];
                     additions.iter().for_each(|a| memory[a.to as usize] = 0.0);
@@ -109,6 +115,21 @@ impl Slopes {
             let slope = memory[place as usize];
             *entry = if slope.is_finite() { slope } else { 0.0 };
         }
+    }
+}
+
+/// The slopes of a solution: of its arguments, each times how much the solution grows with it.
+fn solved(tape: &Tape, step: u32, additions: &[Addition], registers: &[f64], memory: &mut [f64]) {
+    let Step::Solved(call) = tape.steps[step as usize] else { return };
+    additions.iter().for_each(|a| memory[a.to as usize] = 0.0);
+    let mut by: Vec<usize> = additions.iter().map(|a| a.factor as usize).collect();
+    by.sort_unstable();
+    by.dedup();
+    let mut slopes = Vec::new();
+    tape.calls[call as usize].slopes(registers, &by, &mut slopes);
+    for addition in additions {
+        let slope = by.binary_search(&(addition.factor as usize)).map_or(0.0, |place| slopes[place]);
+        memory[addition.to as usize] += times(slope, memory[addition.from as usize]);
     }
 }
 
@@ -129,7 +150,7 @@ fn partials(step: Step, registers: &[f64], result: usize) -> (f64, f64) {
         }
         Step::Select(c, ..) if registers[c as usize] != 0.0 => (1.0, 0.0),
         Step::Select(..) => (0.0, 1.0),
-        Step::Sum(..) => (0.0, 0.0),
+        Step::Sum(..) | Step::Solved(_) => (0.0, 0.0),
     }
 }
 
@@ -173,7 +194,14 @@ impl Compiler {
                 Step::Unary(_, a) => self.pair(a, None),
                 Step::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq | BinaryOp::And | BinaryOp::Or, ..) => None,
                 Step::Binary(_, a, b) | Step::Select(_, a, b) => self.pair(a, Some(b)),
-                Step::Sum(first, count) => self.sum(tape, first, count),
+                Step::Sum(first, count) => {
+                    let terms = tape.summed(first, count).map(|term| (term.register, term.factor));
+                    self.sum(terms).map(|(start, count)| Code::Sum(start, count))
+                }
+                Step::Solved(call) => {
+                    let args = tape.calls[call as usize].args.iter().enumerate();
+                    self.sum(args.map(|(i, a)| (*a, i as f64))).map(|(start, count)| Code::Solved(start, count))
+                }
             };
             self.code.extend(code.map(|code| (i as u32, start, code)));
             let own = (start, self.columns.len() as u32 - start);
@@ -219,12 +247,13 @@ impl Compiler {
         (count > 0).then_some(Code::Pairs(start, count))
     }
 
-    fn sum(&mut self, tape: &Tape, first: u32, count: u32) -> Option<Code> {
+    /// The slopes of what rests on many registers, each with a number of its own.
+    fn sum(&mut self, terms: impl Iterator<Item = (u32, f64)>) -> Option<(u32, u32)> {
         let (start, base) = (self.additions.len(), self.columns.len());
         let mut found: Vec<(u32, u32, f64)> = Vec::new();
-        for term in tape.summed(first, count) {
-            let (place, count) = self.slopes[term.register as usize];
-            found.extend((place..place + count).map(|place| (self.columns[place as usize], place, term.factor)));
+        for (register, factor) in terms {
+            let (place, count) = self.slopes[register as usize];
+            found.extend((place..place + count).map(|place| (self.columns[place as usize], place, factor)));
         }
         // Stable: each slope is added up in the order of the terms.
         found.sort_by_key(|f| f.0);
@@ -235,7 +264,7 @@ impl Compiler {
             self.additions.push(Addition { to: self.columns.len() as u32 - 1, from, factor });
         }
         let count = self.additions.len() - start;
-        (count > 0).then_some(Code::Sum(start as u32, count as u32))
+        (count > 0).then_some((start as u32, count as u32))
     }
 
     fn finish(self, tape: &Tape) -> Slopes {

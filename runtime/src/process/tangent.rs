@@ -28,6 +28,7 @@ pub(super) fn push(tape: &Tape, registers: &[f64], direction: &[f64], tangents: 
             Step::Sum(first, count) => {
                 tape.summed(first, count).map(|t| t.factor * tangents[t.register as usize]).sum()
             }
+            Step::Solved(call) => tape.calls[call as usize].carried(registers, tangents, |part| part),
         };
     }
 }
@@ -61,6 +62,7 @@ pub(super) fn noise(tape: &Tape, registers: &[f64]) -> Vec<f64> {
             Step::Sum(first, count) => {
                 tape.summed(first, count).map(|t| (t.factor * noise[t.register as usize]).abs()).sum()
             }
+            Step::Solved(call) => tape.calls[call as usize].carried(registers, &noise, f64::abs),
         };
         let all = carried + f64::EPSILON * value.abs();
         noise[first + i] = if all.is_finite() { all } else { 0.0 };

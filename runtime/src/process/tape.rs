@@ -1,5 +1,8 @@
 //! A compact program for the numbers that change within one segment.
 
+use std::sync::Arc;
+
+use matterix_ir::equilibrium::{Part, System};
 use matterix_ir::graph::{binary, unary};
 use matterix_ir::interval::{self, Interval};
 use matterix_ir::{BinaryOp, UnaryOp};
@@ -12,6 +15,43 @@ pub(super) enum Step {
     Select(u32, u32, u32),
     /// So many of the tape's terms from this one on, added up as if exactly.
     Sum(u32, u32),
+    /// What one of the tape's calls gives.
+    Solved(u32),
+}
+
+/// A number of a solution, its arguments by their registers.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Call {
+    pub(super) system: Arc<System>,
+    pub(super) part: Part,
+    pub(super) args: Vec<u32>,
+}
+
+impl Call {
+    /// What its arguments are.
+    fn args<V: Copy>(&self, registers: &[V]) -> Vec<V> {
+        self.args.iter().map(|a| registers[*a as usize]).collect()
+    }
+
+    fn value(&self, registers: &[f64]) -> f64 {
+        self.system.value(self.part, &self.args(registers))
+    }
+
+    /// Its slopes by those arguments that pass a test, as they are numbered.
+    pub(super) fn slopes(&self, registers: &[f64], by: &[usize], out: &mut Vec<f64>) {
+        self.system.slopes(self.part, &self.args(registers), by, out);
+    }
+
+    /// What some numbers of its arguments come to, each times its slope; those that are 0 cost nothing.
+    pub(super) fn carried(&self, registers: &[f64], of: &[f64], take: fn(f64) -> f64) -> f64 {
+        let by: Vec<usize> = (0..self.args.len()).filter(|i| of[self.args[*i] as usize] != 0.0).collect();
+        if by.is_empty() {
+            return 0.0;
+        }
+        let mut slopes = Vec::new();
+        self.slopes(registers, &by, &mut slopes);
+        by.iter().zip(&slopes).map(|(i, slope)| take(slope * of[self.args[*i] as usize])).sum()
+    }
 }
 
 /// A multiple of a register.
@@ -30,6 +70,8 @@ pub(super) struct Tape {
     pub(super) steps: Vec<Step>,
     /// What sums are of.
     pub(super) terms: Vec<Term>,
+    /// Solutions that are asked for.
+    pub(super) calls: Vec<Call>,
     /// Registers of the results that are asked for.
     pub(super) outputs: Vec<u32>,
 }
@@ -42,6 +84,7 @@ impl PartialEq for Tape {
             && self.outputs == other.outputs
             && self.steps == other.steps
             && self.terms == other.terms
+            && self.calls == other.calls
             && bits(self) == bits(other)
     }
 }
@@ -77,6 +120,7 @@ impl Tape {
                 Step::Sum(first, count) => {
                     exact_sum(self.summed(first, count).map(|t| (t.factor, registers[t.register as usize])))
                 }
+                Step::Solved(call) => self.calls[call as usize].value(registers),
             };
         }
     }
@@ -88,6 +132,7 @@ impl Tape {
             Step::Binary(_, a, b) => [a, b].into_iter().for_each(visit),
             Step::Select(c, a, b) => [c, a, b].into_iter().for_each(visit),
             Step::Sum(first, count) => self.summed(first, count).for_each(|t| visit(t.register)),
+            Step::Solved(call) => self.calls[call as usize].args.iter().for_each(|a| visit(*a)),
         }
     }
 
@@ -116,6 +161,11 @@ impl Tape {
                     tape.terms.extend(self.summed(from, count).map(|t| Term { register: at(t.register), ..t }));
                     Step::Sum(place, count)
                 }
+                Step::Solved(call) => {
+                    let call = &self.calls[call as usize];
+                    tape.calls.push(Call { args: call.args.iter().map(|a| at(*a)).collect(), ..call.clone() });
+                    Step::Solved(tape.calls.len() as u32 - 1)
+                }
             };
             tape.steps.push(step);
             places[first + i] = Some((first + tape.steps.len() - 1) as u32);
@@ -134,6 +184,7 @@ impl Tape {
                 Step::Binary(_, a, b) => on(a) || on(b),
                 Step::Select(c, a, b) => on(c) || on(a) || on(b),
                 Step::Sum(first, count) => self.summed(first, count).any(|t| on(t.register)),
+                Step::Solved(call) => self.calls[call as usize].args.iter().any(|a| on(*a)),
             };
             rests.push(below || test(step));
         }
@@ -181,6 +232,10 @@ impl Tape {
                     let part = interval::of_binary(BinaryOp::Mul, part, bounds[term.register as usize]);
                     interval::of_binary(BinaryOp::Add, sum, part)
                 }),
+                Step::Solved(call) => {
+                    let Call { system, part, .. } = &self.calls[call as usize];
+                    system.bounds_nearby(*part, &self.calls[call as usize].args(bounds))
+                }
             };
         }
     }

@@ -211,7 +211,14 @@ mod tests {
             Step::Unary(UnaryOp::Neg, 8),
             Step::Unary(UnaryOp::Exp, 9),
         ];
-        Tape { constants: vec![1e4, 60.0, 1.0], inputs: 2, steps, terms: Vec::new(), outputs: vec![2, 10] }
+        Tape {
+            constants: vec![1e4, 60.0, 1.0],
+            inputs: 2,
+            steps,
+            terms: Vec::new(),
+            calls: Vec::new(),
+            outputs: vec![2, 10],
+        }
     }
 
     #[test]

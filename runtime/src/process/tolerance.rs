@@ -173,7 +173,14 @@ mod tests {
             Step::Binary(BinaryOp::Sub, 7, 8),
             Step::Binary(BinaryOp::Sub, 2, 7),
         ];
-        Tape { constants: vec![0.1, 0.2, 0.0], inputs: 3, steps, terms: Vec::new(), outputs: vec![10, 9, 8] }
+        Tape {
+            constants: vec![0.1, 0.2, 0.0],
+            inputs: 3,
+            steps,
+            terms: Vec::new(),
+            calls: Vec::new(),
+            outputs: vec![10, 9, 8],
+        }
     }
 
     #[test]

@@ -17,6 +17,7 @@ impl Engine<'_> {
             Op::Unary(UnaryOp::Sqrt, _) => "the square root of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) < 0.0 => "a power of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) == 0.0 => "a division by zero",
+            Op::Solved(..) => "equilibria that no amounts meet",
             Op::Select(..) => "a table that is read beyond its first or last point",
             Op::Local(_) | Op::Reading(_) => "it depends on a value that is not set yet",
             _ => "a number too large",

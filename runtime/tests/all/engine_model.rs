@@ -111,7 +111,7 @@ impl Build {
 
     /// A mixture of amounts; `keys` are sorted pairs of key and state.
     pub fn mixture(&mut self, keys: &[(&str, u32)]) -> u32 {
-        let contents = keys.iter().map(|k| Content { species: 0, state: k.1 }).collect();
+        let contents = keys.iter().map(|k| Content { species: 0, state: k.1, settled: None }).collect();
         self.model.mixtures.push(Mixture {
             instance: InstanceId(0),
             extensive: keys.iter().map(|(k, s)| ((*k).to_string(), *s)).collect(),

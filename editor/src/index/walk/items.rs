@@ -66,7 +66,8 @@ impl Walk<'_> {
                     self.exprs(&label.tolerance);
                 }
             }
-            ItemKind::Reaction { reactants, products, fields, .. } => {
+            ItemKind::Reaction { reactants, products, fields, .. }
+            | ItemKind::Equilibrium { reactants, products, fields, .. } => {
                 self.terms(reactants);
                 self.terms(products);
                 self.reaction_fields(fields);

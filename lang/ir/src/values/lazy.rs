@@ -4,6 +4,7 @@
 //! region around all of them. The operations of a side stand one after the other, before the choice.
 
 use super::Formula;
+use crate::equilibrium::Call;
 use crate::graph::{BinaryOp, NodeId, Op};
 
 /// Sides with fewer operations are worked out whether they are needed or not.
@@ -51,14 +52,15 @@ fn operands(op: Op) -> impl Iterator<Item = (NodeId, Option<(NodeId, bool)>)> {
 }
 
 /// The formula of operations that stand operands first.
-pub(super) fn formula(ops: Vec<Op>) -> Formula {
+pub(super) fn formula(ops: Vec<Op>, calls: Vec<Call>) -> Formula {
     if !ops.iter().any(|op| operands(*op).any(|(_, not_for)| not_for.is_some())) {
-        return Formula { ops: ops.into(), skips: Box::default() };
+        return Formula { ops: ops.into(), skips: Box::default(), calls: calls.into() };
     }
     let regions = Regions::new(&ops);
     let mut out = Arranged { ops: Vec::with_capacity(ops.len()), skips: Vec::new(), places: vec![0; ops.len()] };
     out.add(&regions, 0, &ops);
-    Formula { ops: out.ops.into(), skips: out.skips.into() }
+    let calls = calls.into_iter().map(|call| out.moved(call)).collect();
+    Formula { ops: out.ops.into(), skips: out.skips.into(), calls }
 }
 
 /// The regions of a formula; the first one is the whole.
@@ -139,11 +141,18 @@ impl Arranged {
                 Op::Unary(op, a) => Op::Unary(op, place(a)),
                 Op::Binary(op, a, b) => Op::Binary(op, place(a), place(b)),
                 Op::Select(c, a, b) => Op::Select(place(c), place(a), place(b)),
+                Op::List(a, b) => Op::List(place(a), place(b)),
+                Op::Solved(call, list) => Op::Solved(call, place(list)),
                 leaf => leaf,
             };
             self.places[at] = self.ops.len() as u32;
             self.ops.push(op);
         }
+    }
+
+    /// A call with its arguments where they stand now.
+    fn moved(&self, call: Call) -> Call {
+        Call { args: call.args.iter().map(|arg| NodeId(self.places[arg.0 as usize])).collect(), ..call }
     }
 
     fn add_side(&mut self, regions: &Regions, side: usize, ops: &[Op]) {

@@ -3,7 +3,8 @@
 use std::collections::hash_map::Entry;
 use std::rc::Rc;
 
-use matterix_ir::graph::unary;
+use matterix_ir::equilibrium::Call;
+use matterix_ir::graph::{digest, unary};
 use matterix_ir::values::Rules;
 use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 use rustc_hash::FxHashSet;
@@ -62,6 +63,10 @@ impl Rules for Exact<'_> {
     fn truth(&self, condition: f64) -> Option<bool> {
         Some(condition != 0.0)
     }
+
+    fn solved(&self, call: &Call, args: &[f64]) -> Option<f64> {
+        Some(call.system.value(call.part, args)).filter(|v| !v.is_nan())
+    }
 }
 
 /// The same, with these numbers as the values of some states.
@@ -91,6 +96,10 @@ impl Rules for Supposed<'_> {
 
     fn truth(&self, condition: f64) -> Option<bool> {
         self.exact.truth(condition)
+    }
+
+    fn solved(&self, call: &Call, args: &[f64]) -> Option<f64> {
+        self.exact.solved(call, args)
     }
 }
 
@@ -416,6 +425,9 @@ impl Interpreter<'_, '_> {
                 Op::Unary(_, a) => self.values.is_stale(*n, &[a]),
                 Op::Binary(_, a, b) => self.values.is_stale(*n, &[a, b]),
                 Op::Select(c, a, b) => self.values.is_stale(*n, &[c, a, b]),
+                Op::List(a, b) => self.values.is_stale(*n, &[a, b]),
+                // What is known of a list may be the same where what it holds is not.
+                Op::Solved(call, _) => self.values.is_stale(*n, &self.lab.graph.call(call).args),
             };
             if stale {
                 let value = self.done_again(op);
@@ -433,6 +445,20 @@ impl Interpreter<'_, '_> {
             Op::Binary(BinaryOp::Eq, a, b) if a == b => AbstractValue::Point(1.0),
             Op::Binary(op, a, b) => AbstractValue::binary(op, of(a), of(b)),
             Op::Select(c, a, b) => AbstractValue::select(of(c), of(a), of(b)),
+            Op::List(a, b) => match (of(a).exact(), of(b).exact()) {
+                (Some(a), Some(b)) => AbstractValue::point(digest(a, b)),
+                _ => AbstractValue::top(),
+            },
+            Op::Solved(call, _) => {
+                let call = self.lab.graph.call(call);
+                let args: Vec<(f64, f64)> = call.args.iter().map(|arg| of(*arg).bounds()).collect();
+                let (low, high) = call.system.bounds(call.part, &args);
+                if low == high {
+                    AbstractValue::point(low)
+                } else {
+                    AbstractValue::Range(low, high, Imprecision::Unknown)
+                }
+            }
             Op::Time | Op::State(_) | Op::Param(_) | Op::Local(_) | Op::Reading(_) => AbstractValue::top(),
         }
     }
@@ -448,7 +474,7 @@ impl Interpreter<'_, '_> {
                 let value = self.reading(i, facts);
                 self.values.leaf(leaf, &value);
             }
-            Op::Const(_) | Op::Unary(..) | Op::Binary(..) | Op::Select(..) => {}
+            Op::Const(_) | Op::Unary(..) | Op::Binary(..) | Op::Select(..) | Op::List(..) | Op::Solved(..) => {}
         }
     }
 

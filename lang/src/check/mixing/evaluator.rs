@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use matterix_ir::equilibrium::Call;
 use matterix_ir::graph::{binary, unary};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::values::{Formulas, Rules};
@@ -137,6 +138,12 @@ impl<M: Fn(u32) -> bool> Rules for Look<'_, M> {
 
     fn truth(&self, (value, known): (f64, bool)) -> Option<bool> {
         known.then_some(value != 0.0)
+    }
+
+    fn solved(&self, call: &Call, args: &[(f64, bool)]) -> Option<(f64, bool)> {
+        let numbers: Vec<f64> = args.iter().map(|a| a.0).collect();
+        let value = call.system.value(call.part, &numbers);
+        Some((value, !value.is_nan() && args.iter().all(|a| a.1)))
     }
 
     fn either(&self, condition: (f64, bool), a: (f64, bool), b: (f64, bool)) -> Option<(f64, bool)> {

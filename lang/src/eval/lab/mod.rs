@@ -32,6 +32,7 @@ pub mod written;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, RwLock};
 
+use matterix_ir::equilibrium::System;
 use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
@@ -43,11 +44,15 @@ use crate::ast::{self, Expr, FieldValue};
 use crate::declare::{MemberRef, ReactionId, SpeciesId, Tables, Type};
 use crate::eval::Value;
 use crate::eval::call::KnownCall;
+use crate::eval::equilibrium::Speciation;
 use crate::names::DeclId;
 use crate::units::Dimension;
 
 pub use instances::Instance;
 pub use mode::Mode;
+
+/// Systems of equilibria by their species and equations.
+pub type Systems = BTreeMap<(Vec<SpeciesId>, Vec<usize>), Option<Arc<System>>>;
 
 /// A member in one way of looking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -255,6 +260,10 @@ pub struct Elaborator<'a> {
     pub touched_flow: bool,
     /// Concentrations by mixture, species, capability and kind.
     pub view_values: BTreeMap<(InstanceId, SpeciesId), BTreeMap<(DeclId, Dimension), Value>>,
+    /// The equilibria of mixtures that were asked for.
+    pub speciations: BTreeMap<InstanceId, Option<Arc<Speciation>>>,
+    /// Systems of equilibria by their species and equations.
+    pub systems: Systems,
     /// What evaluations come upon besides values, where somebody asks: see [`Elaborator::observe`].
     pub observed: Option<Box<observed::Observed>>,
     /// Where a call says of what it takes something, and its sources are looked into.
@@ -351,6 +360,8 @@ impl<'a> Elaborator<'a> {
             processes: Vec::new(),
             flows_sealed: false,
             touched_flow: false,
+            speciations: BTreeMap::new(),
+            systems: BTreeMap::new(),
             view_values: BTreeMap::new(),
             observed: None,
             looked_into: BTreeSet::new(),

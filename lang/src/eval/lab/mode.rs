@@ -9,13 +9,15 @@ pub struct Mode {
     pub at_start: bool,
     /// Readings are what devices report, not the true values behind them.
     pub reported: bool,
+    /// Amounts are those that were put there, before equilibria have moved them: what laws change, and what is conserved.
+    pub pooled: bool,
 }
 
 impl Mode {
     /// As the run begins.
-    pub const START: Mode = Mode { at_start: true, reported: false };
+    pub const START: Mode = Mode { at_start: true, reported: false, pooled: false };
     /// As devices report them.
-    pub const REPORTED: Mode = Mode { at_start: false, reported: true };
+    pub const REPORTED: Mode = Mode { at_start: false, reported: true, pooled: false };
 }
 
 impl Elaborator<'_> {

@@ -171,6 +171,16 @@ fn close(set: &mut BTreeSet<SpeciesId>, tables: &Tables<'_>) {
                 set.extend(r.products.iter().map(|p| p.0));
             }
         }
+        for e in &tables.equilibria {
+            let is_there = |left: bool| {
+                let mut side = e.terms.iter().filter(|(_, n)| (*n < 0.0) == left);
+                side.all(|(s, _)| set.contains(s) || tables.species.get(*s).is_water)
+            };
+            let is_wet = e.terms.iter().all(|(s, _)| !tables.species.get(*s).is_water || set.contains(s));
+            if is_wet && (is_there(true) || is_there(false)) {
+                set.extend(e.terms.iter().map(|t| t.0));
+            }
+        }
         if set.len() == before {
             return;
         }

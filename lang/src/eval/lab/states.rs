@@ -56,8 +56,8 @@ impl<'a> Elaborator<'a> {
     /// The value of a member now, and at the start, as `at_start` says.
     fn keep_value(&mut self, id: InstanceId, m: MemberRef<'a>, at_start: &[bool], value: &Value) {
         for at_start in at_start.iter().copied() {
-            for reported in [false, true] {
-                let key = MemberKey::of(m, Mode { at_start, reported });
+            for (reported, pooled) in [(false, false), (true, false), (false, true), (true, true)] {
+                let key = MemberKey::of(m, Mode { at_start, reported, pooled });
                 self.instances[id.0 as usize].values.insert(key, value.clone());
             }
         }

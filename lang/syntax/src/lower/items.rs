@@ -39,6 +39,11 @@ impl Lower<'_> {
                 products: self.side_in(kids),
                 fields: self.fields_in(kids),
             },
+            Rule::equilibrium => {
+                let (name, reactants) = (self.name_in(kids), self.side_in(kids));
+                kids.has(Rule::biarrow);
+                ItemKind::Equilibrium { name, reactants, products: self.side_in(kids), fields: self.fields_in(kids) }
+            }
             Rule::reactive_group => ItemKind::ReactiveGroup { name: self.name_in(kids), fields: self.fields_in(kids) },
             Rule::material => ItemKind::Material { name: self.name_in(kids), fields: self.fields_in(kids) },
             Rule::framing => {

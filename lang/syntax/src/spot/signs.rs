@@ -84,7 +84,7 @@ pub(super) fn operator(spot: &Spot) -> Option<Mistake> {
         (":=", "="),
         ("++", "+= 1"),
     ];
-    if spot.form() == "reaction" {
+    if matches!(spot.form(), "reaction" | "equilibrium") {
         return None;
     }
     // The first sign of two may have been read as an operator of its own.
@@ -100,8 +100,12 @@ pub(super) fn operator(spot: &Spot) -> Option<Mistake> {
 }
 
 pub(super) fn reaction_arrow(spot: &Spot) -> Option<Mistake> {
-    if spot.only != Rule::only_item || spot.form() != "reaction" || !spot.before.contains(':') {
+    let form = spot.form();
+    if spot.only != Rule::only_item || !matches!(form, "reaction" | "equilibrium") || !spot.before.contains(':') {
         return None;
+    }
+    if form == "equilibrium" {
+        return both_ways(spot);
     }
     const SIGNS: &[(&str, &str)] = &[
         ("<=>", "<->"),
@@ -159,4 +163,12 @@ pub(super) fn assignment(spot: &Spot) -> Option<Mistake> {
     let (name, sign) = (spot.before, spot.token);
     let mistake = Mistake::new(format!("a step cannot change `{name}`"), "`let` gives a name to a value");
     Some(mistake.guess(format!("write `let {name} {sign} ...`"), spot.start, spot.start, "let "))
+}
+
+/// An equilibrium goes both ways, however that is written.
+fn both_ways(spot: &Spot) -> Option<Mistake> {
+    const SIGNS: &[&str] = &["<==>", "<-->", "<=>", "==>", "-->", "->", "=>", "==", "="];
+    let sign = SIGNS.iter().find(|sign| spot.after.starts_with(**sign))?;
+    let mistake = Mistake::new("an equilibrium is written with `<->`".to_owned(), "write `<->`".to_owned());
+    Some(mistake.fix("write `<->`".to_owned(), spot.at, spot.at + sign.len(), "<->"))
 }

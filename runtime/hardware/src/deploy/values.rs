@@ -82,11 +82,11 @@ impl Hardware<'_, '_> {
                 continue;
             }
             let op = graph.op(n);
-            let is_leaf = op.operands().next().is_none();
-            let value = if is_leaf {
-                engine.eval(n)
-            } else {
-                matterix_ir::graph::apply(op, |_| f64::NAN, |o| values.get(&o).copied().unwrap_or(f64::NAN))
+            let at = |o: NodeId| values.get(&o).copied().unwrap_or(f64::NAN);
+            let value = match op {
+                Op::Solved(call, _) => graph.call(call).value(at),
+                op if op.operands().next().is_none() => engine.eval(n),
+                op => matterix_ir::graph::apply(op, |_| f64::NAN, at),
             };
             values.insert(n, value);
         }

@@ -46,7 +46,10 @@ fn states<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
         model.mixtures.iter().flat_map(list).collect()
     };
     let amounts = shown_elsewhere(|m| m.contents.iter().map(|c| c.state).collect());
-    let derived = shown_elsewhere(|m| m.properties.iter().chain(&m.concentrations).copied().collect());
+    let derived = shown_elsewhere(|m| {
+        let settled = m.contents.iter().filter_map(|c| c.settled);
+        m.properties.iter().chain(&m.concentrations).copied().chain(settled).collect()
+    });
     let states = (0..model.states.len()).filter(|&i| !amounts.contains(&(i as u32)));
     let others = (0..model.observables.len()).filter(|&i| !derived.contains(&(i as u32)) && !repeats(run, i));
     let columns = states.filter_map(|i| Column::state(run, i)).chain(others.filter_map(|i| Column::observable(run, i)));
@@ -75,7 +78,10 @@ fn contents<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
             .iter()
             .map(|c| model.species.get(c.species as usize).map_or_else(|| c.species.to_string(), |s| s.name.clone()))
             .collect();
-        let amounts = mixture.contents.iter().map(|c| Column::state(run, c.state as usize));
+        let amounts = mixture.contents.iter().map(|c| match c.settled {
+            Some(i) => Column::observable(run, i as usize),
+            None => Column::state(run, c.state as usize),
+        });
         let concentrations = mixture.concentrations.iter().map(|&i| Column::observable(run, i as usize));
         let properties = mixture.properties.iter().filter_map(|&i| Column::observable(run, i as usize));
         let named = |columns: Vec<Option<Column<'a>>>| -> Vec<Field<'a>> {

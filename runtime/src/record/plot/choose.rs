@@ -197,7 +197,9 @@ fn contents(run: &Run<'_>, mixture: &Mixture) -> Vec<Panel> {
     let name = name_of(run, mixture);
     let given = mixture.concentrations.iter().map(|&i| Column::observable(run, i as usize));
     let columns: Vec<Option<Column<'_>>> = if mixture.concentrations.is_empty() {
-        mixture.contents.iter().map(|c| Column::state(run, c.state as usize)).collect()
+        let settled = |i: u32| Column::observable(run, i as usize);
+        let put = |state: u32| Column::state(run, state as usize);
+        mixture.contents.iter().map(|c| c.settled.map_or_else(|| put(c.state), settled)).collect()
     } else {
         given.collect()
     };

@@ -95,7 +95,8 @@ fn container(run: &Run<'_>, mixture: &Mixture) -> ContainerReport {
 
 fn content(run: &Run<'_>, content: &Content, concentration: Option<u32>) -> Option<SpeciesReport> {
     let species = run.program.model.species.get(content.species as usize)?;
-    let amount = end(run.recording.states.get(content.state as usize)?);
+    let settled = content.settled.and_then(|i| run.recording.observables.get(i as usize)?.first());
+    let amount = end(settled.or_else(|| run.recording.states.get(content.state as usize))?);
     let of = |index: u32| {
         let observable = run.program.model.observables.get(index as usize)?;
         let (_, value) = run.recording.observables.get(index as usize)?.first()?.last()?;

@@ -155,7 +155,10 @@ fn model() -> Model {
     model.mixtures = vec![Mixture {
         instance: InstanceId(3),
         extensive: vec![("amount[EtI]".into(), 6), ("amount[EtOH]".into(), 5), ("enthalpy".into(), 4)],
-        contents: vec![Content { species: 0, state: 5 }, Content { species: 1, state: 6 }],
+        contents: vec![
+            Content { species: 0, state: 5, settled: None },
+            Content { species: 1, state: 6, settled: None },
+        ],
         properties: vec![0, 1],
         concentrations: vec![2, 3],
     }];

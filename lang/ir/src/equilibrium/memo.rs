@@ -1,0 +1,103 @@
+//! The last solutions of this thread: the numbers of one mixture are asked for one after the other.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::basis::Basis;
+use super::slopes::Slopes;
+use super::solve::{self, Solution};
+use super::{System, Written};
+
+/// So many solutions are kept. Which ones changes no result.
+const KEPT: usize = 256;
+
+/// So many bases are kept.
+const BASES_KEPT: usize = 1024;
+
+/// A system, the solids that are there, and what they replace.
+type Held = (u64, Vec<usize>, Vec<usize>);
+
+struct Entry {
+    system: u64,
+    args: Vec<f64>,
+    solution: Option<Solution>,
+    slopes: Slopes,
+}
+
+thread_local! {
+    static BASES: RefCell<BTreeMap<Held, Option<Arc<Basis>>>> = const { RefCell::new(BTreeMap::new()) };
+    static LAST: RefCell<Vec<Option<Entry>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Numbers mixed into one.
+pub(super) fn mixed(seed: u64, words: impl Iterator<Item = u64>) -> u64 {
+    words.fold(seed, |hash, word| {
+        let product = u128::from(hash.rotate_left(5) ^ word) * 0x9e37_79b9_7f4a_7c15;
+        (product >> 64) as u64 ^ product as u64
+    })
+}
+
+/// What tells one system from others.
+pub(super) fn fingerprint(written: &Written) -> u64 {
+    let text = |text: &str| mixed(7, text.bytes().map(u64::from));
+    let members = written.members.iter().flat_map(|m| [text(&m.name), m.phase as u64, m.charge.to_bits()]);
+    let equations = written
+        .equations
+        .iter()
+        .flat_map(|e| [text(&e.name)].into_iter().chain(e.coefficients.iter().map(|c| c.to_bits())));
+    mixed(written.solvent_mass.to_bits(), members.chain(equations))
+}
+
+/// The basis of a system where some solids are there; none where these can become each other.
+pub(super) fn basis(system: &System, held: &[usize], replaced: &[usize]) -> Option<Arc<Basis>> {
+    if held.is_empty() {
+        return Some(system.basis.clone());
+    }
+    BASES.with_borrow_mut(|bases| {
+        if bases.len() > BASES_KEPT {
+            bases.clear();
+        }
+        let make = || {
+            let mut pairs = held.iter().zip(replaced);
+            let basis = pairs.try_fold(Basis::clone(&system.basis), |basis, (solid, by)| basis.with(*solid, *by));
+            basis.filter(|basis| basis.held.len() == held.len()).map(Arc::new)
+        };
+        bases.entry((system.fingerprint, held.to_vec(), replaced.to_vec())).or_insert_with(make).clone()
+    })
+}
+
+fn entry<R>(system: &System, args: &[f64], work: impl FnOnce(&mut Entry) -> R) -> R {
+    let place = mixed(system.fingerprint, args.iter().map(|a| a.to_bits())) as usize % KEPT;
+    LAST.with_borrow_mut(|last| {
+        if last.is_empty() {
+            last.resize_with(KEPT, || None);
+        }
+        let is_same = |known: &Entry| {
+            let bits = |args: &[f64]| args.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
+            known.system == system.fingerprint && known.args.len() == args.len() && bits(&known.args) == bits(args)
+        };
+        let known = last[place].take().filter(is_same);
+        let known = last[place].insert(known.unwrap_or_else(|| Entry {
+            system: system.fingerprint,
+            args: args.to_vec(),
+            solution: solve::solve(system, args),
+            slopes: Slopes::default(),
+        }));
+        work(known)
+    })
+}
+
+/// Does something with the solution for these arguments.
+pub(super) fn with<R>(system: &System, args: &[f64], work: impl FnOnce(Option<&Solution>) -> R) -> R {
+    entry(system, args, |known| work(known.solution.as_ref()))
+}
+
+/// The same with its slopes.
+pub(super) fn with_slopes<R>(
+    system: &System,
+    args: &[f64],
+    work: impl FnOnce(Option<(&Solution, &mut Slopes)>) -> R,
+) -> R {
+    entry(system, args, |known| work(known.solution.as_ref().map(|solution| (solution, &mut known.slopes))))
+}

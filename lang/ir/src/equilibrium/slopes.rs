@@ -1,0 +1,217 @@
+//! How a solution moves with its arguments: the conditions stay met, so `F_x dx + F_a da = 0`.
+
+use super::basis::Basis;
+use super::solve::{LN_10, Point, Problem, Solution};
+use super::{Part, Phase, System};
+
+/// Slopes of one solution, found as they are asked for.
+#[derive(Debug, Default)]
+pub(super) struct Slopes {
+    /// By argument.
+    known: Vec<Option<Direction>>,
+}
+
+/// How all moves with one argument.
+#[derive(Clone, Debug)]
+struct Direction {
+    /// The unknowns.
+    step: Vec<f64>,
+    /// The logarithms of dissolved members beside that, and of constants of solids.
+    grown: Vec<f64>,
+}
+
+impl Slopes {
+    /// The slope of a part by an argument.
+    pub(super) fn of(&mut self, system: &System, solution: &Solution, args: &[f64], part: Part, arg: usize) -> f64 {
+        let basis = solution.point.as_ref().map_or(&system.basis, |point| &point.basis);
+        let problem = Problem::new(system, args, basis.clone());
+        let Some(point) = &solution.point else { return as_given(&problem, part, arg) };
+        if self.known.len() != args.len() {
+            self.known = vec![None; args.len()];
+        }
+        let direction = self.known[arg].get_or_insert_with(|| direction(&problem, point, arg));
+        slope(&problem, point, direction, part, arg)
+    }
+}
+
+/// Without a solvent all is as it was given.
+fn as_given(problem: &Problem<'_>, part: Part, arg: usize) -> f64 {
+    let layout = problem.layout;
+    let (heat, capacity) = (problem.args[layout.heat()], problem.args[layout.capacity()]);
+    let one = |is: bool| f64::from(u8::from(is));
+    match part {
+        Part::Amount(i) => one(arg == layout.amount(i as usize)),
+        Part::Temperature if arg == layout.reference() => 1.0,
+        Part::Temperature if arg == layout.heat() && capacity.is_finite() => 1.0 / capacity,
+        Part::Temperature if arg == layout.capacity() && capacity.is_finite() => -heat / (capacity * capacity),
+        _ => 0.0,
+    }
+}
+
+fn direction(problem: &Problem<'_>, point: &Point, arg: usize) -> Direction {
+    let grown = grown(problem, point, arg);
+    let mut right = problem.moved(&grown, point);
+    aside(problem, point, arg, &mut right);
+    right.iter_mut().for_each(|v| *v = -*v);
+    Direction { step: point.factors.solve(&right), grown }
+}
+
+/// How the logarithm of each dissolved member, and of the constant of each solid, grows with an argument while the unknowns stay.
+fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
+    let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
+    let (strength, temperature) = (point.x[places.strength()], point.x[places.temperature()]);
+    let equations = problem.system.equations().len();
+    let count = basis.of.len();
+    if arg < super::Layout::ACTIVITIES {
+        let of = |i: usize| match problem.system.members()[i] {
+            super::Member { phase: Phase::Solute, charge, .. } => {
+                -coefficient_by(problem, charge, strength, temperature, arg)
+            }
+            _ => 0.0,
+        };
+        return (0..count).map(of).collect();
+    }
+    if arg < layout.enthalpy(0) {
+        let r = arg - layout.constant(0);
+        return (0..count).map(|i| by_equation(basis, i, r)).collect();
+    }
+    if arg < layout.enthalpy(0) + equations {
+        let r = arg - layout.enthalpy(0);
+        return (0..count).map(|i| -by_equation(basis, i, r) / (super::solve::GAS * temperature)).collect();
+    }
+    vec![0.0; count]
+}
+
+/// The logarithm of an activity coefficient by one of the numbers that it is made of.
+fn coefficient_by(problem: &Problem<'_>, charge: f64, strength: f64, temperature: f64, arg: usize) -> f64 {
+    let all = problem.activities;
+    let strength = strength.clamp(0.0, all.most);
+    if charge == 0.0 {
+        return if arg == 5 { LN_10 * strength } else { 0.0 };
+    }
+    let warm = temperature - super::solve::STANDARD;
+    let ((limiting, _), (shape, _)) = (problem.limiting(temperature), problem.shape(strength));
+    let root = strength.sqrt();
+    let by = -LN_10 * charge * charge;
+    by * match arg {
+        0 => shape,
+        1 => shape * warm,
+        2 => shape * warm * warm,
+        3 => -limiting * strength / (1.0 + all.b * root).powi(2),
+        4 => -limiting * strength,
+        _ => 0.0,
+    }
+}
+
+/// How much of an equation forms a member.
+fn by_equation(basis: &Basis, member: usize, equation: usize) -> f64 {
+    basis.by[member].iter().filter(|(r, _)| *r == equation).map(|(_, by)| *by).sum()
+}
+
+/// How much of a member has formed, whatever its phase.
+fn taken(problem: &Problem<'_>, point: &Point, member: usize) -> f64 {
+    let basis = &problem.basis;
+    let formed = |i: usize| point.state.amounts[i] - problem.given(i);
+    let of = |i: usize| -> f64 {
+        if let Some(c) = basis.masters.iter().position(|m| *m == member) {
+            return basis.of[i][c];
+        }
+        if let Some(k) = basis.held.iter().position(|m| *m == member) {
+            return basis.of_held[i][k];
+        }
+        if member == basis.water { basis.solvent[i] } else { 0.0 }
+    };
+    let is_master = basis.masters.contains(&member) || basis.held.contains(&member) || member == basis.water;
+    if !is_master {
+        return formed(member);
+    }
+    // What others have taken of it.
+    -(0..basis.of.len()).filter(|i| *i != member).map(|i| of(i) * formed(i)).sum::<f64>()
+}
+
+/// How conditions move with an argument that they name themselves.
+fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
+    let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
+    let state = &point.state;
+    let (scale, isothermal) = (problem.energy_scale(), problem.is_isothermal());
+    let warmth = places.temperature();
+    let equations = problem.system.equations().len();
+    let members = basis.of.len();
+    let formed = |i: usize| state.amounts[i] - problem.given(i);
+    if arg >= layout.amount(0) && arg < layout.bystanders() {
+        let i = arg - layout.amount(0);
+        for (row, of) in &basis.parts[i] {
+            // A total below 0 stands on the other side.
+            let total = point.totals.of[*row];
+            rows[*row] -= of / state.sides[*row][usize::from(total >= 0.0)];
+        }
+        if !isothermal {
+            rows[warmth] += (state.enthalpies[i] + state.capacities[i] * state.warmer) / scale;
+        }
+    } else if arg == layout.bystanders() {
+        rows[places.strength()] -= problem.strength_by_charges(state);
+    } else if isothermal {
+        rows[warmth] -= f64::from(u8::from(arg == layout.reference()));
+    } else if arg == layout.heat() {
+        rows[warmth] += 1.0 / scale;
+    } else if arg == layout.capacity() {
+        rows[warmth] -= state.warmer / scale;
+    } else if arg == layout.reference() {
+        rows[warmth] += state.capacity / scale;
+    } else if arg >= layout.capacity_of(0) && arg < layout.amount(0) {
+        rows[warmth] -= taken(problem, point, arg - layout.capacity_of(0)) * state.warmer / scale;
+    } else if arg >= layout.enthalpy(0) && arg < layout.enthalpy(0) + equations {
+        let r = arg - layout.enthalpy(0);
+        rows[warmth] -= (0..members).map(|i| by_equation(basis, i, r) * formed(i)).sum::<f64>() / scale;
+    }
+}
+
+/// The slope of a part where the unknowns and what else there is move so.
+fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part, arg: usize) -> f64 {
+    let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
+    let dissolved = |i: usize| {
+        let beside = match problem.system.members()[i].phase {
+            Phase::Solute => direction.grown[i] * point.state.amounts[i],
+            _ => 0.0,
+        };
+        problem.growth(&direction.step, point, i) + beside
+    };
+    let amount = |i: usize| match basis.held.iter().position(|s| *s == i) {
+        Some(k) => {
+            let added = arg.checked_sub(layout.amount(0)).filter(|i| *i < basis.of.len());
+            let total = added.map_or(0.0, |i| basis.of_held[i][k]);
+            total - (0..basis.of.len()).map(|i| basis.of_held[i][k] * dissolved(i)).sum::<f64>()
+        }
+        None => dissolved(i),
+    };
+    let given = |i: usize| f64::from(u8::from(arg == layout.amount(i)));
+    let all = 0..basis.of.len();
+    match part {
+        Part::Amount(i) => amount(i as usize),
+        Part::Activity(i) => {
+            let (i, temperature) = (i as usize, point.x[places.temperature()]);
+            let formed: f64 = problem.masters_of(i).map(|(c, of)| of * direction.step[c]).sum();
+            // What makes activities of amounts moves the amount, not the activity.
+            let constant = if arg < super::Layout::ACTIVITIES { 0.0 } else { direction.grown[i] };
+            let rise = problem.constant_rise(i, &point.state, temperature);
+            formed + constant + rise * direction.step[places.temperature()]
+        }
+        Part::Temperature => direction.step[places.temperature()],
+        Part::Strength => direction.step[places.strength()],
+        Part::Heat => {
+            let by_enthalpy = |i: usize| {
+                let r = arg.checked_sub(layout.enthalpy(0)).filter(|r| *r < problem.system.equations().len());
+                r.map_or(0.0, |r| by_equation(basis, i, r) * (point.state.amounts[i] - problem.given(i)))
+            };
+            all.map(|i| point.state.enthalpies[i] * (dissolved(i) - given(i)) + by_enthalpy(i)).sum()
+        }
+        Part::Capacity => {
+            let capacity = |i: usize| problem.args[layout.capacity_of(i)];
+            let by_capacity = |i: usize| match arg == layout.capacity_of(i) {
+                true => taken(problem, point, i),
+                false => 0.0,
+            };
+            all.map(|i| capacity(i) * (amount(i) - given(i)) + by_capacity(i)).sum()
+        }
+    }
+}

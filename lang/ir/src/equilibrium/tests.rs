@@ -1,0 +1,238 @@
+use super::*;
+
+const LN_10: f64 = std::f64::consts::LN_10;
+
+/// Builds systems by short texts.
+struct Sketch {
+    written: Written,
+    constants: Vec<f64>,
+    enthalpies: Vec<f64>,
+}
+
+impl Sketch {
+    fn new() -> Sketch {
+        let water = Member { name: "water".into(), phase: Phase::Solvent, charge: 0.0 };
+        let written = Written { members: vec![water], equations: Vec::new(), solvent_mass: 0.018_015 };
+        Sketch { written, constants: Vec::new(), enthalpies: Vec::new() }
+    }
+
+    fn member(&mut self, name: &str) -> usize {
+        if let Some(known) = self.written.members.iter().position(|m| m.name == name) {
+            return known;
+        }
+        let phase = if name.ends_with("(s)") { Phase::Solid } else { Phase::Solute };
+        let signs = |sign: char| name.chars().rev().take_while(|c| *c == sign).count() as f64;
+        let charge = signs('+') - signs('-');
+        self.written.members.push(Member { name: name.into(), phase, charge });
+        self.written.equations.iter_mut().for_each(|e| e.coefficients.push(0.0));
+        self.written.members.len() - 1
+    }
+
+    /// `-1 HA 1 H+ 1 A-` with log10 K and kJ/mol.
+    fn equation(mut self, text: &str, log: f64, enthalpy: f64) -> Sketch {
+        let words: Vec<&str> = text.split(' ').collect();
+        let mut found = Vec::new();
+        for pair in words.chunks(2) {
+            found.push((self.member(pair[1]), pair[0].parse::<f64>().unwrap()));
+        }
+        let mut coefficients = vec![0.0; self.written.members.len()];
+        found.into_iter().for_each(|(i, n)| coefficients[i] += n);
+        self.written.equations.push(Equation { name: text.into(), coefficients });
+        self.constants.push(log * LN_10 + enthalpy * 1e3 / (solve::GAS * 298.15));
+        self.enthalpies.push(enthalpy * 1e3);
+        self
+    }
+
+    fn build(self) -> Mixture {
+        let system = System::try_from(self.written).unwrap();
+        let layout = system.layout();
+        let mut args = vec![0.0; layout.count()];
+        args[6] = 1e9;
+        for (r, (k, h)) in self.constants.iter().zip(&self.enthalpies).enumerate() {
+            args[layout.constant(r)] = *k;
+            args[layout.enthalpy(r)] = *h;
+        }
+        args[layout.capacity()] = f64::INFINITY;
+        args[layout.reference()] = 298.15;
+        Mixture { system, args }
+    }
+}
+
+struct Mixture {
+    system: System,
+    args: Vec<f64>,
+}
+
+impl Mixture {
+    fn find(&self, name: &str) -> u32 {
+        self.system.members().iter().position(|m| m.name == name).unwrap() as u32
+    }
+
+    fn with(mut self, all: &[(&str, f64)]) -> Mixture {
+        for (name, amount) in all {
+            let at = self.system.layout().amount(self.find(name) as usize);
+            self.args[at] = *amount;
+        }
+        self
+    }
+
+    fn davies(mut self) -> Mixture {
+        self.args[..7].copy_from_slice(&[0.509, 0.0, 0.0, 1.0, 0.3, 0.0, 1e9]);
+        self
+    }
+
+    fn amount(&self, name: &str) -> f64 {
+        self.system.value(Part::Amount(self.find(name)), &self.args)
+    }
+
+    fn ph(&self) -> f64 {
+        -self.system.value(Part::Activity(self.find("H+")), &self.args) / LN_10
+    }
+}
+
+fn acids() -> Sketch {
+    Sketch::new()
+        .equation("-1 water 1 H+ 1 OH-", -13.995, 55.8)
+        .equation("-1 HAc 1 H+ 1 Ac-", -4.756, -0.4)
+        .equation("-1 CO2 -1 water 1 H+ 1 HCO3-", -6.35, 9.1)
+        .equation("-1 HCO3- 1 H+ 1 CO3--", -10.33, 14.7)
+        .equation("-1 H3PO4 1 H+ 1 H2PO4-", -2.16, -8.0)
+        .equation("-1 H2PO4- 1 H+ 1 HPO4--", -7.21, 3.6)
+        .equation("-1 HPO4-- 1 H+ 1 PO4---", -12.32, 16.0)
+        .equation("1 NH3 1 water -1 NH4+ -1 OH-", 4.75, -3.5)
+        .equation("-1 AgCl(s) 1 Ag+ 1 Cl-", -9.75, 65.7)
+        .equation("-1 Ag+ -2 NH3 1 Ag(NH3)2+", 7.22, -56.0)
+        .equation("-1 CaCO3(s) 1 Ca++ 1 CO3--", -8.48, -10.0)
+        .equation("-1 Ca(OH)2(s) 1 Ca++ 2 OH-", -5.19, -18.0)
+}
+
+const WATER: f64 = 55.508;
+
+#[test]
+fn pure_water_is_neutral() {
+    let pure = acids().build().with(&[("water", WATER)]);
+    assert!((pure.ph() - 6.9975).abs() < 1e-4, "{}", pure.ph());
+    assert_eq!(pure.amount("HAc"), 0.0);
+}
+
+#[test]
+fn acids_and_bases_of_the_textbook() {
+    let ph = |all: &[(&str, f64)]| acids().build().with(&[("water", WATER)]).with(all).ph();
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.01, "{found} is not {expected}");
+    near(ph(&[("H+", 0.1)]), 1.0);
+    near(ph(&[("HAc", 0.1)]), 2.88);
+    near(ph(&[("NH3", 0.1)]), 11.12);
+    near(ph(&[("CO3--", 0.1)]), 11.65);
+    near(ph(&[("HCO3-", 0.1)]), 8.34);
+    near(ph(&[("H3PO4", 0.1)]), 1.63);
+    near(ph(&[("H2PO4-", 0.1), ("HPO4--", 0.1)]), 7.21);
+}
+
+#[test]
+fn solids_appear_and_vanish() {
+    let silver = |ag: f64, cl: f64| acids().build().with(&[("water", WATER), ("Ag+", ag), ("Cl-", cl)]);
+    let little = silver(1e-6, 1e-6);
+    assert_eq!(little.amount("AgCl(s)"), 0.0);
+    let much = silver(1e-3, 1e-3);
+    assert!((much.amount("Ag+") - 1.333e-5).abs() < 1e-7, "{}", much.amount("Ag+"));
+    let dissolved = acids().build().with(&[("water", WATER), ("AgCl(s)", 1e-3), ("NH3", 1.0)]);
+    assert!(dissolved.amount("AgCl(s)") < 1e-12);
+    let lime = acids().build().with(&[("water", WATER), ("CaCO3(s)", 0.1)]);
+    assert!((lime.ph() - 9.9).abs() < 0.1, "{}", lime.ph());
+}
+
+/// A mixture of everything, scaled from nanomoles to kilomoles.
+fn random(seed: u64) -> Mixture {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut draw = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut mixture = acids().build();
+    let size = 10f64.powf(draw() * 12.0 - 9.0);
+    let layout = mixture.system.layout();
+    for i in 1..mixture.system.members().len() {
+        if draw() < 0.4 {
+            mixture.args[layout.amount(i)] = size * 10f64.powf(draw() * 10.0 - 10.5);
+        }
+    }
+    mixture.args[layout.amount(0)] = size * (1.0 + 50.0 * draw());
+    if seed.is_multiple_of(2) {
+        mixture = mixture.davies();
+        mixture.args[6] = 1.0;
+    }
+    if seed.is_multiple_of(3) {
+        mixture.args[layout.capacity()] = 75.0 * mixture.args[layout.amount(0)];
+        mixture.args[layout.heat()] = mixture.args[layout.capacity()] * (draw() * 40.0 - 10.0);
+    }
+    mixture
+}
+
+#[test]
+fn random_mixtures_are_all_solved() {
+    for seed in 0..20_000 {
+        let mixture = random(seed);
+        let problem = solve::Problem::new(&mixture.system, &mixture.args, mixture.system.basis.clone());
+        let solution = solve::solve(&mixture.system, &mixture.args)
+            .unwrap_or_else(|| panic!("mixture {seed}: {:?}", mixture.args));
+        let point = solution.point.as_ref().unwrap();
+        let off = point.state.residuals.iter().fold(0.0_f64, |most, r| most.max(r.abs()));
+        assert!(off < 1e-10, "mixture {seed}: {off}");
+        let basis = &problem.basis;
+        for c in 0..basis.masters.len() {
+            let sum = |of: &dyn Fn(usize) -> f64| (0..basis.of.len()).map(|i| basis.of[i][c] * of(i)).sum::<f64>();
+            let size = (0..basis.of.len())
+                .map(|i| (basis.of[i][c] * solution.amounts[i]).abs().max((basis.of[i][c] * problem.given(i)).abs()))
+                .fold(0.0, f64::max);
+            let gap = sum(&|i| solution.amounts[i]) - sum(&|i| problem.given(i));
+            assert!(gap.abs() <= 1e-9 * size + 1e-40, "mixture {seed}: total {c} is off by {gap} of {size}");
+        }
+        assert!(solution.amounts.iter().all(|n| *n >= 0.0), "mixture {seed}");
+    }
+}
+
+#[test]
+fn slopes_are_those_of_differences() {
+    let mut checked = 0;
+    for seed in 0..60 {
+        let mixture = random(seed);
+        let system = &mixture.system;
+        let layout = system.layout();
+        let count = system.members().len() as u32;
+        let mut parts: Vec<Part> = (0..count).map(Part::Amount).collect();
+        parts.extend([Part::Temperature, Part::Strength, Part::Heat, Part::Capacity, Part::Activity(1)]);
+        for part in parts {
+            let all: Vec<usize> = (0..layout.count()).collect();
+            let mut slopes = Vec::new();
+            system.slopes(part, &mixture.args, &all, &mut slopes);
+            for arg in all {
+                let value = mixture.args[arg];
+                if !value.is_finite() || value == 0.0 || arg == 6 {
+                    continue;
+                }
+                let step = 1e-5 * value.abs();
+                let at = |by: f64| {
+                    let mut args = mixture.args.clone();
+                    args[arg] += by;
+                    system.value(part, &args)
+                };
+                let wide = (at(step) - at(-step)) / (2.0 * step);
+                let narrow = (at(0.5 * step) - at(-0.5 * step)) / step;
+                let size = at(0.0).abs() / value.abs();
+                let of_differences = matches!(part, Part::Heat | Part::Capacity);
+                let rough = if of_differences { 0.05 } else { 1e-4 };
+                let noise = 1e-25 + rough * wide.abs().max(narrow.abs()) + 1e-5 * size + 3.0 * (wide - narrow).abs();
+                assert!(
+                    (slopes[arg] - wide).abs() <= noise,
+                    "mixture {seed}, {part:?} by {arg}: {:e} is not {wide:e} (or {narrow:e}) of {:e} by {value:e}",
+                    slopes[arg],
+                    at(0.0)
+                );
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 10_000);
+}

@@ -1,0 +1,150 @@
+//! The table of equilibria, and the checks that need no lab: balance, and what constants are of.
+
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::SpeciesId;
+use super::fields::unknown_fields;
+use super::reactions::check_balance;
+use super::species::{SpeciesTable, field};
+use crate::ast::{Field, ItemKind};
+use crate::names::{Names, used};
+
+/// The fields of which each gives the constant of an equilibrium.
+pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp"];
+
+const FIELDS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", "at", "enthalpy", "valid", "source"];
+
+/// An equilibrium whose species are all known.
+#[derive(Clone, Debug)]
+pub struct EquilibriumDef<'a> {
+    /// Its name.
+    pub name: String,
+    /// Its module.
+    pub module: usize,
+    /// Its species with their coefficients: products count up, reactants down.
+    pub terms: Vec<(SpeciesId, f64)>,
+    /// Which of them are pure solids.
+    pub solids: Vec<SpeciesId>,
+    /// Its fields.
+    pub fields: &'a [Field],
+    /// Its equation.
+    pub equation: Span,
+    /// Its name.
+    pub span: Span,
+}
+
+impl EquilibriumDef<'_> {
+    /// Whether a species is in its equation.
+    pub fn involves(&self, s: SpeciesId) -> bool {
+        self.terms.iter().any(|(t, _)| *t == s)
+    }
+}
+
+/// Reads every `equilibrium` item; those with unknown species are reported and left out.
+pub fn collect<'a>(
+    names: &'a Names<'a>,
+    species: &SpeciesTable<'a>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<EquilibriumDef<'a>> {
+    let mut out: Vec<EquilibriumDef<'a>> = Vec::new();
+    let is_equilibrium = |decl: &&crate::names::Decl<'a>| matches!(decl.item.kind, ItemKind::Equilibrium { .. });
+    // Those of the library hold where a file asks for them.
+    let used = if names.decls.iter().any(|decl| is_equilibrium(&decl)) { used(names.modules) } else { Vec::new() };
+    for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true)) {
+        let ItemKind::Equilibrium { name, reactants, products, fields } = &decl.item.kind else { continue };
+        unknown_fields(fields, FIELDS, "an equilibrium", diagnostics);
+        let left = species.terms(names, decl.module, reactants, diagnostics);
+        let right = species.terms(names, decl.module, products, diagnostics);
+        if left.len() != reactants.len() || right.len() != products.len() {
+            continue;
+        }
+        let equation =
+            Span::to(reactants.first().map_or(name.span, |t| t.span), products.last().map_or(name.span, |t| t.span));
+        let before = diagnostics.len();
+        check_balance(species, &left, &right, equation, &name.text, diagnostics);
+        check_constant((&name.text, name.span), fields, diagnostics);
+        check_form(species, (&left, &right), fields, equation, diagnostics);
+        if diagnostics[before..].iter().any(Diagnostic::is_error) {
+            continue;
+        }
+        let solids = solids(species, (&left, &right), fields);
+        let mut terms: Vec<(SpeciesId, f64)> = Vec::new();
+        for (s, n) in left.into_iter().map(|(s, n)| (s, -n)).chain(right) {
+            match terms.iter_mut().find(|(t, _)| *t == s) {
+                Some((_, known)) => *known += n,
+                None => terms.push((s, n)),
+            }
+        }
+        terms.retain(|(_, n)| *n != 0.0);
+        let (name, span) = (name.text.clone(), name.span);
+        out.push(EquilibriumDef { name, module: decl.module, terms, solids, fields, equation, span });
+    }
+    out
+}
+
+/// One of the fields gives its constant.
+fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mut Vec<Diagnostic>) {
+    let mut given = CONSTANTS.iter().filter_map(|key| field(fields, key));
+    match (given.next(), given.next()) {
+        (None, _) => diagnostics.push(
+            Diagnostic::error(
+                codes::MISSING_FIELD,
+                span,
+                format!("`{name}` has no constant"),
+                "where it lies is unknown",
+            )
+            .help("add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10` or `pksp: 9.75`"),
+        ),
+        (Some(first), Some(second)) => diagnostics.push(
+            Diagnostic::error(
+                codes::UNKNOWN_FIELD,
+                second.key.span,
+                format!("`{name}` has two constants"),
+                "the second one",
+            )
+            .because(first.key.span, "the first one"),
+        ),
+        _ => {}
+    }
+}
+
+/// Species with their coefficients on the two sides.
+type Sides<'s> = (&'s [(SpeciesId, f64)], &'s [(SpeciesId, f64)]);
+
+/// A pKa is that of an acid which gives off H+, a solubility product that of one solid which dissolves.
+fn check_form(
+    species: &SpeciesTable<'_>,
+    (left, right): Sides<'_>,
+    fields: &[Field],
+    equation: Span,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let is_proton = |s: &SpeciesId| species.get(*s).formula.as_ref().is_some_and(|f| f.to_string() == "H+");
+    let dry = |side: &[(SpeciesId, f64)]| side.iter().filter(|(s, _)| !species.get(*s).is_water).count();
+    if let Some(f) = field(fields, "pka") {
+        let gives = right.iter().any(|(s, n)| is_proton(s) && *n == 1.0) && dry(left) == 1;
+        if !gives {
+            let headline = "a pKa is that of an acid: `HA <-> H+ + A-`";
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "does not give off one H+");
+            let d = d.because(f.key.span, "the pKa stands here");
+            diagnostics.push(d.help("write the equation of the acid, or give `log_constant` for this one"));
+        }
+    }
+    let is_one_solid = dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || *n == 1.0);
+    if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")).filter(|_| !is_one_solid) {
+        let headline = "a solubility product is that of one solid: `AgCl <-> Ag+ + Cl-`";
+        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
+        diagnostics.push(d.because(f.key.span, "the solubility product stands here"));
+    }
+}
+
+/// The pure solids of an equation: what a solubility product is of, and what is written as one.
+fn solids(species: &SpeciesTable<'_>, (left, right): Sides<'_>, fields: &[Field]) -> Vec<SpeciesId> {
+    let of_product = ["ksp", "pksp"].iter().any(|key| field(fields, key).is_some());
+    let all = left.iter().map(|(s, _)| (*s, true)).chain(right.iter().map(|(s, _)| (*s, false)));
+    let is_solid = |(s, on_left): &(SpeciesId, bool)| {
+        let def = species.get(*s);
+        def.name.ends_with("(s)") || (of_product && *on_left && !def.is_water)
+    };
+    all.filter(is_solid).map(|(s, _)| s).collect()
+}

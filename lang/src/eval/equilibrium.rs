@@ -1,0 +1,502 @@
+//! Equilibria of a mixture: the system of those whose species can be there, and the numbers that it rests on.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use matterix_ir::equilibrium::{Equation, Layout, Member, Part, Phase, System, Written};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
+
+use super::{Num, Scope, Value};
+use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
+use crate::declare::equilibria::CONSTANTS;
+use crate::declare::species::field;
+use crate::declare::{SpeciesId, Type};
+use crate::eval::lab::{Elaborator, Mode};
+use crate::units::Dimension;
+
+/// Gas constant, J/(mol*K).
+const GAS: f64 = 8.314_462_618_153_24;
+
+/// The temperature at which constants are given, where nothing else is said, K.
+const STANDARD: f64 = 298.15;
+
+/// The option of an amount of matter that says what its equilibria rest on besides it: heat content, heat capacity, the temperature at
+/// which heat contents are 0, and the coefficients of [`matterix_ir::equilibrium::Activities`].
+pub const EQUILIBRIUM: &str = "equilibrium";
+
+/// The option that names the property of species which is their heat capacity.
+pub const CAPACITY: &str = "capacity_by";
+
+/// The first items of that are the heat content and the heat capacity.
+const HEAT_AND_CAPACITY: usize = 2;
+
+/// The equilibria of one mixture.
+#[derive(Debug)]
+pub struct Speciation {
+    /// They, and their species.
+    pub system: Arc<System>,
+    /// Its species, in the order of the members.
+    pub members: Vec<SpeciesId>,
+    /// Which of all equilibria they are.
+    pub equilibria: Vec<usize>,
+    /// What it rests on, in the order of [`Layout`].
+    pub args: Arc<[NodeId]>,
+}
+
+impl<'a> Elaborator<'a> {
+    /// The amount of a species at equilibrium; none where it takes part in none.
+    pub fn settled_amount(&mut self, id: InstanceId, s: SpeciesId) -> Option<NodeId> {
+        self.settled(id, |speciation| Some(Part::Amount(speciation.place(s)?)))
+    }
+
+    /// A number of the equilibria of a mixture; none where it has none.
+    pub fn settled(&mut self, id: InstanceId, part: impl FnOnce(&Speciation) -> Option<Part>) -> Option<NodeId> {
+        let speciation = self.speciation(id)?;
+        let part = part(&speciation)?;
+        Some(self.graph.solved(&speciation.system, part, &speciation.args))
+    }
+
+    /// The equilibria of a mixture; made once.
+    pub fn speciation(&mut self, id: InstanceId) -> Option<Arc<Speciation>> {
+        if self.tables.equilibria.is_empty() || self.prototype || self.mode().at_start || self.mode().pooled {
+            return None;
+        }
+        if let Some(known) = self.speciations.get(&id) {
+            return known.clone();
+        }
+        let made = self.in_mode(Mode { pooled: true, ..Mode::default() }, |lab| lab.make_speciation(id, None));
+        let made = made.map(Arc::new);
+        self.speciations.insert(id, made.clone());
+        made
+    }
+
+    /// The heat that it takes to come to equilibrium at a temperature from what a mixture holds at the start, with the heat of the
+    /// change in heat capacity; none where there are no equilibria.
+    pub fn heat_at_start(&mut self, id: InstanceId, temperature: NodeId) -> Option<NodeId> {
+        if self.tables.equilibria.is_empty() || self.prototype {
+            return None;
+        }
+        let mode = Mode { at_start: true, pooled: true, ..Mode::default() };
+        let made = self.in_mode(mode, |lab| lab.make_speciation(id, Some(temperature)))?;
+        let heat = self.graph.solved(&made.system, Part::Heat, &made.args);
+        let capacity = self.graph.solved(&made.system, Part::Capacity, &made.args);
+        let reference = self.in_mode(mode, |lab| lab.surroundings(id))?[2];
+        let warmer = self.graph.binary(BinaryOp::Sub, temperature, reference);
+        let warm = self.graph.binary(BinaryOp::Mul, capacity, warmer);
+        Some(self.graph.binary(BinaryOp::Add, heat, warm))
+    }
+
+    /// Writes out the system of a mixture; at a temperature that is given, or at the one that its heat content makes.
+    fn make_speciation(&mut self, id: InstanceId, temperature: Option<NodeId>) -> Option<Speciation> {
+        let here: BTreeMap<SpeciesId, u32> = self.amounts_in(id).collect();
+        let equilibria: Vec<usize> = (0..self.tables.equilibria.len())
+            .filter(|e| self.tables.equilibria[*e].terms.iter().all(|(s, _)| here.contains_key(s)))
+            .collect();
+        let water = here.keys().copied().find(|s| self.tables.species.get(*s).is_water)?;
+        let mut members = vec![water];
+        for e in &equilibria {
+            for (s, _) in &self.tables.equilibria[*e].terms {
+                if !members.contains(s) {
+                    members.push(*s);
+                }
+            }
+        }
+        if equilibria.is_empty() {
+            return None;
+        }
+        let system = self.system_of(&members, &equilibria)?;
+        let args = self.numbers_of(id, &members, &equilibria, &system, temperature)?;
+        Some(Speciation { system, members, equilibria, args })
+    }
+
+    /// The system of some equilibria; made once for all mixtures that have the same.
+    fn system_of(&mut self, members: &[SpeciesId], equilibria: &[usize]) -> Option<Arc<System>> {
+        let key = (members.to_vec(), equilibria.to_vec());
+        if let Some(known) = self.systems.get(&key) {
+            return known.clone();
+        }
+        let made = System::try_from(self.written_system(members, equilibria)).ok().map(Arc::new);
+        self.systems.insert(key, made.clone());
+        made
+    }
+
+    fn written_system(&self, members: &[SpeciesId], equilibria: &[usize]) -> Written {
+        let tables = self.tables;
+        let is_solid = |s: &SpeciesId| equilibria.iter().any(|e| tables.equilibria[*e].solids.contains(s));
+        let member = |s: &SpeciesId| {
+            let def = tables.species.get(*s);
+            let phase = match (def.is_water, is_solid(s)) {
+                (true, _) => Phase::Solvent,
+                (_, true) => Phase::Solid,
+                _ => Phase::Solute,
+            };
+            let charge = def.formula.as_ref().map_or(0.0, |f| f64::from(f.charge));
+            Member { name: def.name.clone(), phase, charge }
+        };
+        let equation = |e: &usize| {
+            let def = &tables.equilibria[*e];
+            let of = |s: &SpeciesId| def.terms.iter().find(|(t, _)| t == s).map_or(0.0, |(_, n)| *n);
+            Equation { name: def.name.clone(), coefficients: members.iter().map(of).collect() }
+        };
+        let solvent_mass = members.first().map_or(0.0, |s| tables.species.get(*s).molar_mass);
+        let (members, equations) = (members.iter().map(member).collect(), equilibria.iter().map(equation).collect());
+        Written { members, equations, solvent_mass }
+    }
+
+    fn numbers_of(
+        &mut self,
+        id: InstanceId,
+        members: &[SpeciesId],
+        equilibria: &[usize],
+        system: &System,
+        temperature: Option<NodeId>,
+    ) -> Option<Arc<[NodeId]>> {
+        let layout = system.layout();
+        let around = self.surroundings(id)?;
+        let none = self.graph.number(0.0);
+        let mut args = vec![none; layout.count()];
+        let [heat, capacity, reference, activities @ ..] = around.as_slice() else { return None };
+        for (i, node) in activities.iter().enumerate() {
+            *args.get_mut(i).filter(|_| i < Layout::ACTIVITIES)? = *node;
+        }
+        for (r, e) in equilibria.iter().enumerate() {
+            let [constant, enthalpy] = self.constants(*e)?;
+            (args[layout.constant(r)], args[layout.enthalpy(r)]) = (constant, enthalpy);
+        }
+        let property = self.capacity_property(id);
+        for (i, s) in members.iter().enumerate() {
+            args[layout.amount(i)] = self.held(id, *s);
+            if let Some(capacity) = property.as_ref().and_then(|p| self.capacity_of(*s, p)) {
+                args[layout.capacity_of(i)] = capacity;
+            }
+        }
+        args[layout.bystanders()] = self.bystanders(id, members);
+        match temperature {
+            Some(temperature) => {
+                args[layout.capacity()] = self.graph.number(f64::INFINITY);
+                args[layout.reference()] = temperature;
+            }
+            None => {
+                (args[layout.heat()], args[layout.capacity()]) = (*heat, *capacity);
+                args[layout.reference()] = *reference;
+            }
+        }
+        Some(args.into())
+    }
+
+    /// What is there of a species, with what salts, acids and bases give of it; at the start these have not split yet.
+    fn held(&mut self, id: InstanceId, s: SpeciesId) -> NodeId {
+        let here: Vec<(SpeciesId, u32)> = self.amounts_in(id).collect();
+        let at_start = self.mode().at_start;
+        let mut sum = self.graph.number(0.0);
+        for (other, state) in here {
+            let count = match other == s {
+                true => 1.0,
+                false if at_start && self.splits(other) => {
+                    let ions = &self.tables.species.get(other).dissolves;
+                    ions.iter().filter(|(ion, _)| *ion == s).map(|(_, n)| *n).sum()
+                }
+                false => 0.0,
+            };
+            if count == 0.0 {
+                continue;
+            }
+            let amount = match at_start {
+                true => self.states[state as usize].initial,
+                false => self.graph.add(Op::State(state)),
+            };
+            let count = self.graph.number(count);
+            let part = self.graph.binary(BinaryOp::Mul, count, amount);
+            sum = self.graph.binary(BinaryOp::Add, sum, part);
+        }
+        sum
+    }
+
+    /// Half the sum of amount times charge squared over the ions that are in no equilibrium.
+    fn bystanders(&mut self, id: InstanceId, members: &[SpeciesId]) -> NodeId {
+        let here: Vec<(SpeciesId, u32)> = self.amounts_in(id).collect();
+        let mut sum = self.graph.number(0.0);
+        for (s, _) in here.into_iter().filter(|(s, _)| !members.contains(s)) {
+            let charge = self.tables.species.get(s).formula.as_ref().map_or(0, |f| f.charge);
+            if charge != 0 {
+                let amount = self.held(id, s);
+                let weight = self.graph.number(0.5 * f64::from(charge * charge));
+                let part = self.graph.binary(BinaryOp::Mul, weight, amount);
+                sum = self.graph.binary(BinaryOp::Add, sum, part);
+            }
+        }
+        sum
+    }
+
+    /// What the equilibria of a mixture rest on besides its amounts, as its kind declares.
+    fn surroundings(&mut self, id: InstanceId) -> Option<Vec<NodeId>> {
+        let (option, member) = self.matter_option(id, EQUILIBRIUM)?;
+        let ExprKind::Tuple(items, _) = &*option.value.kind else { return None };
+        let none = self.graph.number(0.0);
+        let mut scope = Scope::of_member(id, member);
+        let mut found = Vec::with_capacity(items.len());
+        for (i, item) in items.iter().enumerate() {
+            // At the start the temperature is given, and the heat content follows from it.
+            let is_left_out = i < HEAT_AND_CAPACITY && self.mode().at_start;
+            let node = if is_left_out {
+                none
+            } else {
+                let value = self.expr(item, &mut scope);
+                self.value_node(&value)?
+            };
+            found.push(node);
+        }
+        Some(found)
+    }
+
+    fn matter_option(&self, id: InstanceId, name: &str) -> Option<(&'a NamedExpr, crate::declare::MemberRef<'a>)> {
+        let member = self.all_members(id).iter().copied().find(|m| self.is_matter(id, *m))?;
+        let MemberKind::Value { options, .. } = &member.member.kind else { return None };
+        Some((options.iter().find(|o| o.name.text == name)?, member))
+    }
+
+    fn capacity_property(&self, id: InstanceId) -> Option<String> {
+        let (option, _) = self.matter_option(id, CAPACITY)?;
+        match &*option.value.kind {
+            ExprKind::Text(text) => Some(text.clone()),
+            _ => None,
+        }
+    }
+
+    fn capacity_of(&mut self, s: SpeciesId, property: &str) -> Option<NodeId> {
+        let name = crate::ast::Name { text: property.to_owned(), span: self.tables.species.get(s).span };
+        match self.member(Value::Species(s), &name) {
+            Value::Num(n) => Some(n.node),
+            _ => None,
+        }
+    }
+
+    /// `ln K + enthalpy / (R T)` of an equilibrium, where T is that of its constant, and its enthalpy.
+    fn constants(&mut self, e: usize) -> Option<[NodeId; 2]> {
+        let def = &self.tables.equilibria[e];
+        let (name, fields, module) = (def.name.clone(), def.fields, def.module);
+        let (key, given) = CONSTANTS.iter().find_map(|key| Some((*key, expr_of(fields, key)?)))?;
+        let v = self.expr(given, &mut Scope::module(module));
+        let Value::Num(n) = self.coerce(v, &Type::ratio(), given.span, key) else { return None };
+        let n = self.name_param(&format!("{name}.{key}"), n, given.span);
+        let ln_10 = std::f64::consts::LN_10;
+        let log = |this: &mut Self, factor: f64| {
+            let factor = this.graph.number(factor);
+            this.graph.binary(BinaryOp::Mul, factor, n.node)
+        };
+        let constant = match key {
+            "constant" | "ksp" => {
+                let node = self.graph.unary(UnaryOp::Ln, n.node);
+                self.note_place(node, given.span);
+                node
+            }
+            "log_constant" => log(self, ln_10),
+            _ => log(self, -ln_10),
+        };
+        let Some(enthalpy) = self.enthalpy_of(e) else { return Some([constant, self.graph.number(0.0)]) };
+        let at = self.given_at(e)?;
+        let gas = self.graph.number(GAS);
+        let scale = self.graph.binary(BinaryOp::Mul, gas, at);
+        let shift = self.graph.binary(BinaryOp::Div, enthalpy, scale);
+        Some([self.graph.binary(BinaryOp::Add, constant, shift), enthalpy])
+    }
+
+    fn enthalpy_of(&mut self, e: usize) -> Option<NodeId> {
+        let def = &self.tables.equilibria[e];
+        let (name, given, module) = (def.name.clone(), expr_of(def.fields, "enthalpy")?, def.module);
+        let dimension = self.tables.units.named("Energy").over(&self.tables.units.named("Amount"));
+        let v = self.expr(given, &mut Scope::module(module));
+        let ty = Type::Quantity { dimension, point: false, optional: false };
+        match self.coerce(v, &ty, given.span, "enthalpy") {
+            Value::Num(n) => Some(self.name_param(&format!("{name}.enthalpy"), n, given.span).node),
+            _ => None,
+        }
+    }
+
+    /// The temperature of the constant.
+    fn given_at(&mut self, e: usize) -> Option<NodeId> {
+        let def = &self.tables.equilibria[e];
+        let module = def.module;
+        let Some(given) = expr_of(def.fields, "at") else { return Some(self.graph.number(STANDARD)) };
+        let v = self.expr(given, &mut Scope::module(module));
+        let ty = self.temperature_type();
+        match self.coerce(v, &ty, given.span, "at") {
+            Value::Num(n) => Some(n.node),
+            _ => None,
+        }
+    }
+
+    fn temperature_type(&self) -> Type {
+        let dimension = self.tables.units.dimension("Temperature").map_or_else(Dimension::any, |d| d.dimension.clone());
+        Type::Quantity { dimension, point: true, optional: false }
+    }
+
+    /// Checks an equilibrium by itself: its numbers, and that its constant is above 0.
+    pub fn check_equilibrium(&mut self, e: usize) {
+        let (at, valid) = {
+            let fields = self.tables.equilibria[e].fields;
+            (expr_of(fields, "at"), expr_of(fields, "valid"))
+        };
+        if at.is_some() {
+            self.given_at(e);
+        }
+        if let Some(valid) = valid {
+            let module = self.tables.equilibria[e].module;
+            let v = self.expr(valid, &mut Scope::module(module));
+            let ty = Type::Range(self.temperature_type().into());
+            self.coerce(v, &ty, valid.span, "valid");
+        }
+        let fields = self.tables.equilibria[e].fields;
+        let Some([constant, _]) = self.constants(e) else { return };
+        if self.glance(constant).is_none_or(f64::is_finite) {
+            return;
+        }
+        let span =
+            CONSTANTS.iter().find_map(|key| expr_of(fields, key)).map_or(self.tables.equilibria[e].span, |e| e.span);
+        let headline = "the constant of an equilibrium is above 0";
+        let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "not a constant");
+        self.report(d.help("a reaction that goes to its end has a large constant: `constant: 1e20`"));
+    }
+
+    /// An equilibrium that follows from those before it must agree with them: each circle of constants closes.
+    pub fn check_circles(&mut self, last: usize) {
+        let all: Vec<usize> = (0..=last).collect();
+        let is_water = |s: &SpeciesId| self.tables.species.get(*s).is_water;
+        let mut members: Vec<SpeciesId> = self.tables.species.iter().map(|(s, _)| s).filter(is_water).take(1).collect();
+        for e in &all {
+            let terms = self.tables.equilibria[*e].terms.iter().map(|t| t.0);
+            let new: Vec<SpeciesId> = terms.filter(|s| !members.contains(s)).collect();
+            members.extend(new);
+        }
+        let system = match System::try_from(self.written_system(&members, &all)) {
+            Ok(system) => system,
+            Err(why) => {
+                let def = &self.tables.equilibria[last];
+                if why.0.contains(&format!("`{}`", def.name)) {
+                    let headline = format!("this equilibrium cannot be solved: {why}");
+                    let d =
+                        Diagnostic::error(codes::EQUILIBRIUM_FORM, def.equation, headline, "needs something dissolved");
+                    self.report(d.help("an equilibrium relates what is dissolved in water, or a solid and its ions"));
+                }
+                return;
+            }
+        };
+        let ends = |factors: &[f64]| factors.iter().rposition(|f| f.abs() > 1e-9) == Some(last);
+        let circles: Vec<Vec<f64>> = system.circles().iter().map(|c| c.factors.clone()).collect();
+        circles.iter().filter(|factors| ends(factors)).for_each(|factors| self.check_circle(factors));
+    }
+
+    fn check_circle(&mut self, factors: &[f64]) {
+        let part: Vec<(usize, f64)> = factors.iter().copied().enumerate().filter(|(_, f)| f.abs() > 1e-9).collect();
+        let mut sum = 0.0;
+        for (e, factor) in &part {
+            let Some([constant, enthalpy]) = self.constants(*e) else { return };
+            let at = |this: &mut Self, node| this.glance(node);
+            let (Some(constant), Some(enthalpy)) = (at(self, constant), at(self, enthalpy)) else { return };
+            sum += factor * (constant - enthalpy / (GAS * STANDARD));
+        }
+        let off = (sum / std::f64::consts::LN_10).abs();
+        if off <= CLOSED {
+            return;
+        }
+        let names: Vec<String> = part.iter().map(|(e, _)| format!("`{}`", self.tables.equilibria[*e].name)).collect();
+        let Some((last, _)) = part.last() else { return };
+        let last = &self.tables.equilibria[*last];
+        let headline = format!("the constants of {} contradict each other", listed(&names));
+        let mut d = Diagnostic::error(
+            codes::EQUILIBRIA_CONTRADICT,
+            last.equation,
+            headline,
+            format!("follows from the others, but for {off:.2} in log10 K"),
+        );
+        for (e, _) in &part[..part.len() - 1] {
+            let other = &self.tables.equilibria[*e];
+            d = d.because(other.equation, format!("`{}` is one of the others", other.name));
+        }
+        self.report(d.help("leave out one of them: it follows from the rest"));
+    }
+
+    /// Whether a salt, acid or base splits by itself: one in an equilibrium dissolves by that.
+    pub fn splits(&self, s: SpeciesId) -> bool {
+        let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(s));
+        !is_balanced && !self.tables.species.get(s).dissolves.is_empty()
+    }
+
+    /// `-log10` and the like of the activity of a species at equilibrium; `otherwise` where it takes part in none.
+    pub fn activity_of(&mut self, id: InstanceId, s: SpeciesId, otherwise: &Num) -> Value {
+        match self.settled(id, |speciation| Some(Part::Activity(speciation.place(s)?))) {
+            Some(node) => {
+                let node = self.graph.unary(UnaryOp::Exp, node);
+                Value::Num(Num { node, literal: false, ..otherwise.clone() })
+            }
+            None => Value::Num(otherwise.clone()),
+        }
+    }
+
+    /// Whether all equilibria of a mixture have constants at its temperature.
+    pub fn equilibria_hold(&mut self, id: InstanceId) -> NodeId {
+        let mut holds = self.graph.number(1.0);
+        let Some(speciation) = self.speciation(id) else { return holds };
+        let Some(temperature) = self.settled(id, |_| Some(Part::Temperature)) else { return holds };
+        for e in speciation.equilibria.iter().copied() {
+            let Some((low, high)) = self.window_of(e) else { continue };
+            let above = self.graph.binary(BinaryOp::Le, low, temperature);
+            let below = self.graph.binary(BinaryOp::Le, temperature, high);
+            let within = self.graph.binary(BinaryOp::And, above, below);
+            holds = self.graph.binary(BinaryOp::And, holds, within);
+        }
+        holds
+    }
+
+    /// The temperatures between which an equilibrium has a constant.
+    fn window_of(&mut self, e: usize) -> Option<(NodeId, NodeId)> {
+        let def = &self.tables.equilibria[e];
+        let (module, fields) = (def.module, def.fields);
+        if let Some(valid) = expr_of(fields, "valid") {
+            let v = self.expr(valid, &mut Scope::module(module));
+            let ty = Type::Range(self.temperature_type().into());
+            return match self.coerce(v, &ty, valid.span, "valid") {
+                Value::Range(a, b) => Some((a.node, b.node)),
+                _ => None,
+            };
+        }
+        if expr_of(fields, "enthalpy").is_some() {
+            return Some((self.graph.number(LIQUID.0), self.graph.number(LIQUID.1)));
+        }
+        let (at, reach) = (self.given_at(e)?, self.graph.number(NEAR));
+        Some((self.graph.binary(BinaryOp::Sub, at, reach), self.graph.binary(BinaryOp::Add, at, reach)))
+    }
+}
+
+/// Temperatures between which water is liquid, K.
+const LIQUID: (f64, f64) = (273.15, 373.15);
+
+/// How far from its temperature a constant without an enthalpy serves, K.
+const NEAR: f64 = 10.0;
+
+/// Constants agree to this share of a power of ten: tables round.
+const CLOSED: f64 = 0.05;
+
+impl Speciation {
+    /// The number of a species among the members.
+    pub fn place(&self, s: SpeciesId) -> Option<u32> {
+        self.members.iter().position(|m| *m == s).map(|i| i as u32)
+    }
+}
+
+fn expr_of<'f>(fields: &'f [Field], key: &str) -> Option<&'f Expr> {
+    match &field(fields, key)?.value {
+        FieldValue::Expr(e) => Some(e),
+        _ => None,
+    }
+}
+
+/// `a, b and c`.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
