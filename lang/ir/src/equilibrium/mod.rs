@@ -9,6 +9,7 @@
 //! but then the last digits of a run depend on what was asked before, and a run that is taken up again is another one. So each
 //! solution begins with the totals, and the last ones are kept ([`memo`]).
 
+mod activity;
 mod basis;
 mod bounds;
 mod linear;
@@ -22,6 +23,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+pub use activity::{Activities, Coefficients};
 use basis::Basis;
 pub use basis::{Circle, Unsettled};
 use solve::Solution;
@@ -116,10 +118,11 @@ pub enum Part {
     Capacity,
 }
 
-/// Arguments of a system, in their order: what is the same in all mixtures, then what is of one.
+/// Arguments of a system, in their order: what is the same for all, then what is of an equation, then what is of a member, then the heat.
 ///
-/// The equation of energy is `heat = heat of formation + capacity * (T - reference)`; where `capacity` has no end, the temperature is
-/// `reference`.
+/// The constant of an equation follows from six terms, with the temperature T in K:
+/// `ln K = k0 + k1 / T + k2 ln T + k3 T + k4 / T^2 + k5 T^2`. The equation of energy is
+/// `heat = heat of formation + capacity * (T - reference)`; where `capacity` has no end, the temperature is `reference`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     members: usize,
@@ -127,42 +130,53 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Coefficients of activity, as [`Activities`] reads them.
-    pub const ACTIVITIES: usize = 7;
+    /// Numbers of [`Activities`].
+    pub const ACTIVITIES: usize = 6;
+
+    /// Numbers of [`Coefficients`], of each member.
+    pub const COEFFICIENTS: usize = 4;
+
+    /// Terms of which the logarithm of a constant is the sum.
+    pub const TERMS: usize = 6;
 
     /// How many arguments there are.
     pub fn count(self) -> usize {
         self.reference() + 1
     }
 
-    /// The first coefficient of activity.
+    /// The numbers of [`Activities`] begin here.
     pub fn activities(self) -> usize {
         0
     }
 
-    /// `ln K + enthalpy / (R T)` of an equation, where T is that of its constant.
+    /// The terms of the constant of an equation begin here.
     pub fn constant(self, equation: usize) -> usize {
-        Self::ACTIVITIES + equation
+        Self::ACTIVITIES + Self::TERMS * equation
     }
 
-    /// Enthalpy of an equation, J/mol.
+    /// Enthalpy of an equation at the reference temperature, J/mol.
     pub fn enthalpy(self, equation: usize) -> usize {
-        Self::ACTIVITIES + self.equations + equation
+        self.constant(self.equations) + equation
+    }
+
+    /// The numbers of [`Coefficients`] of a member begin here.
+    pub fn coefficients(self, member: usize) -> usize {
+        self.enthalpy(self.equations) + Self::COEFFICIENTS * member
     }
 
     /// Heat capacity of a member, J/(mol*K).
     pub fn capacity_of(self, member: usize) -> usize {
-        Self::ACTIVITIES + 2 * self.equations + member
+        self.coefficients(self.members) + member
     }
 
     /// The amount of a member as it was put there, mol.
     pub fn amount(self, member: usize) -> usize {
-        Self::ACTIVITIES + 2 * self.equations + self.members + member
+        self.capacity_of(self.members) + member
     }
 
     /// Half the sum of amount times charge squared over the ions that take part in no equation, mol.
     pub fn bystanders(self) -> usize {
-        Self::ACTIVITIES + 2 * self.equations + 2 * self.members
+        self.amount(self.members)
     }
 
     /// Heat content, J.
@@ -179,24 +193,43 @@ impl Layout {
     pub fn reference(self) -> usize {
         self.bystanders() + 3
     }
-}
 
-/// The coefficients by which activities follow from the ionic strength I, in mol/kg:
-/// `log10 gamma = -A z^2 (sqrt(I) / (1 + b sqrt(I)) - c I)` for ions, with `A = a0 + a1 (T - 298.15) + a2 (T - 298.15)^2`, and
-/// `d I` for what has no charge. From `most` on, coefficients are those at `most`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Activities {
-    a: [f64; 3],
-    b: f64,
-    c: f64,
-    d: f64,
-    most: f64,
-}
-
-impl Activities {
-    fn of(args: &[f64]) -> Activities {
-        Activities { a: [args[0], args[1], args[2]], b: args[3], c: args[4], d: args[5], most: args[6] }
+    /// What an argument is.
+    fn role(self, arg: usize) -> Role {
+        let within = |start: usize, each: usize| ((arg - start) / each, (arg - start) % each);
+        if arg < Self::ACTIVITIES {
+            Role::Activities(arg)
+        } else if arg < self.enthalpy(0) {
+            let (equation, term) = within(self.constant(0), Self::TERMS);
+            Role::Constant(equation, term)
+        } else if arg < self.coefficients(0) {
+            Role::Enthalpy(arg - self.enthalpy(0))
+        } else if arg < self.capacity_of(0) {
+            let (member, number) = within(self.coefficients(0), Self::COEFFICIENTS);
+            Role::Coefficient(member, number)
+        } else if arg < self.amount(0) {
+            Role::CapacityOf(arg - self.capacity_of(0))
+        } else if arg < self.bystanders() {
+            Role::Amount(arg - self.amount(0))
+        } else {
+            [Role::Bystanders, Role::Heat, Role::Capacity, Role::Reference][arg - self.bystanders()]
+        }
     }
+}
+
+/// What an argument is, with the number of the equation or member that it is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Activities(usize),
+    Constant(usize, usize),
+    Enthalpy(usize),
+    Coefficient(usize, usize),
+    CapacityOf(usize),
+    Amount(usize),
+    Bystanders,
+    Heat,
+    Capacity,
+    Reference,
 }
 
 impl System {

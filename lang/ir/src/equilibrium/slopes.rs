@@ -1,8 +1,8 @@
 //! How a solution moves with its arguments: the conditions stay met, so `F_x dx + F_a da = 0`.
 
 use super::basis::Basis;
-use super::solve::{LN_10, Point, Problem, Solution};
-use super::{Part, Phase, System};
+use super::solve::{Point, Problem, Solution, terms};
+use super::{Member, Part, Phase, Role, System};
 
 /// Slopes of one solution, found as they are asked for.
 #[derive(Debug, Default)]
@@ -58,48 +58,31 @@ fn direction(problem: &Problem<'_>, point: &Point, arg: usize) -> Direction {
 
 /// How the logarithm of each dissolved member, and of the constant of each solid, grows with an argument while the unknowns stay.
 fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
-    let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
-    let (strength, temperature) = (point.x[places.strength()], point.x[places.temperature()]);
-    let equations = problem.system.equations().len();
+    let (basis, places) = (&problem.basis, problem.places());
+    let around = (point.x[places.strength()], point.x[places.temperature()]);
     let count = basis.of.len();
-    if arg < super::Layout::ACTIVITIES {
-        let of = |i: usize| match problem.system.members()[i] {
-            super::Member { phase: Phase::Solute, charge, .. } => {
-                -coefficient_by(problem, charge, strength, temperature, arg)
+    match problem.layout.role(arg) {
+        Role::Activities(which) => (0..count)
+            .map(|i| match problem.system.members()[i] {
+                Member { phase: Phase::Solute, charge, .. } => {
+                    -problem.coefficients(i).by_common(&problem.activities, charge, around, which)
+                }
+                _ => 0.0,
+            })
+            .collect(),
+        Role::Coefficient(member, which) => {
+            let Member { phase, charge, .. } = problem.system.members()[member];
+            let mut grown = vec![0.0; count];
+            if phase == Phase::Solute {
+                grown[member] = -problem.coefficients(member).by_own(&problem.activities, charge, around, which);
             }
-            _ => 0.0,
-        };
-        return (0..count).map(of).collect();
-    }
-    if arg < layout.enthalpy(0) {
-        let r = arg - layout.constant(0);
-        return (0..count).map(|i| by_equation(basis, i, r)).collect();
-    }
-    if arg < layout.enthalpy(0) + equations {
-        let r = arg - layout.enthalpy(0);
-        return (0..count).map(|i| -by_equation(basis, i, r) / (super::solve::GAS * temperature)).collect();
-    }
-    vec![0.0; count]
-}
-
-/// The logarithm of an activity coefficient by one of the numbers that it is made of.
-fn coefficient_by(problem: &Problem<'_>, charge: f64, strength: f64, temperature: f64, arg: usize) -> f64 {
-    let all = problem.activities;
-    let strength = strength.clamp(0.0, all.most);
-    if charge == 0.0 {
-        return if arg == 5 { LN_10 * strength } else { 0.0 };
-    }
-    let warm = temperature - super::solve::STANDARD;
-    let ((limiting, _), (shape, _)) = (problem.limiting(temperature), problem.shape(strength));
-    let root = strength.sqrt();
-    let by = -LN_10 * charge * charge;
-    by * match arg {
-        0 => shape,
-        1 => shape * warm,
-        2 => shape * warm * warm,
-        3 => -limiting * strength / (1.0 + all.b * root).powi(2),
-        4 => -limiting * strength,
-        _ => 0.0,
+            grown
+        }
+        Role::Constant(r, term) => {
+            let by = terms(around.1)[term];
+            (0..count).map(|i| by * by_equation(basis, i, r)).collect()
+        }
+        _ => vec![0.0; count],
     }
 }
 
@@ -131,44 +114,40 @@ fn taken(problem: &Problem<'_>, point: &Point, member: usize) -> f64 {
 
 /// How conditions move with an argument that they name themselves.
 fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
-    let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
-    let state = &point.state;
+    let (basis, places, state) = (&problem.basis, problem.places(), &point.state);
     let (scale, isothermal) = (problem.energy_scale(), problem.is_isothermal());
     let warmth = places.temperature();
-    let equations = problem.system.equations().len();
-    let members = basis.of.len();
     let formed = |i: usize| state.amounts[i] - problem.given(i);
-    if arg >= layout.amount(0) && arg < layout.bystanders() {
-        let i = arg - layout.amount(0);
-        for (row, of) in &basis.parts[i] {
-            // A total below 0 stands on the other side.
-            let total = point.totals.of[*row];
-            rows[*row] -= of / state.sides[*row][usize::from(total >= 0.0)];
+    match problem.layout.role(arg) {
+        Role::Amount(i) => {
+            for (row, of) in &basis.parts[i] {
+                // A total below 0 stands on the other side.
+                let total = point.totals.of[*row];
+                rows[*row] -= of / state.sides[*row][usize::from(total >= 0.0)];
+            }
+            if !isothermal {
+                rows[warmth] += (state.enthalpies[i] + state.capacities[i] * state.warmer) / scale;
+            }
         }
-        if !isothermal {
-            rows[warmth] += (state.enthalpies[i] + state.capacities[i] * state.warmer) / scale;
+        Role::Bystanders => rows[places.strength()] -= problem.strength_by_charges(state),
+        Role::Reference if isothermal => rows[warmth] -= 1.0,
+        _ if isothermal => {}
+        Role::Heat => rows[warmth] += 1.0 / scale,
+        Role::Capacity => rows[warmth] -= state.warmer / scale,
+        Role::Reference => rows[warmth] += state.capacity / scale,
+        Role::CapacityOf(i) => rows[warmth] -= taken(problem, point, i) * state.warmer / scale,
+        Role::Enthalpy(r) => {
+            let all = 0..basis.of.len();
+            rows[warmth] -= all.map(|i| by_equation(basis, i, r) * formed(i)).sum::<f64>() / scale;
         }
-    } else if arg == layout.bystanders() {
-        rows[places.strength()] -= problem.strength_by_charges(state);
-    } else if isothermal {
-        rows[warmth] -= f64::from(u8::from(arg == layout.reference()));
-    } else if arg == layout.heat() {
-        rows[warmth] += 1.0 / scale;
-    } else if arg == layout.capacity() {
-        rows[warmth] -= state.warmer / scale;
-    } else if arg == layout.reference() {
-        rows[warmth] += state.capacity / scale;
-    } else if arg >= layout.capacity_of(0) && arg < layout.amount(0) {
-        rows[warmth] -= taken(problem, point, arg - layout.capacity_of(0)) * state.warmer / scale;
-    } else if arg >= layout.enthalpy(0) && arg < layout.enthalpy(0) + equations {
-        let r = arg - layout.enthalpy(0);
-        rows[warmth] -= (0..members).map(|i| by_equation(basis, i, r) * formed(i)).sum::<f64>() / scale;
+        Role::Activities(_) | Role::Constant(..) | Role::Coefficient(..) => {}
     }
 }
 
 /// The slope of a part where the unknowns and what else there is move so.
 fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part, arg: usize) -> f64 {
     let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
+    let role = layout.role(arg);
     let dissolved = |i: usize| {
         let beside = match problem.system.members()[i].phase {
             Phase::Solute => direction.grown[i] * point.state.amounts[i],
@@ -178,38 +157,38 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
     };
     let amount = |i: usize| match basis.held.iter().position(|s| *s == i) {
         Some(k) => {
-            let added = arg.checked_sub(layout.amount(0)).filter(|i| *i < basis.of.len());
-            let total = added.map_or(0.0, |i| basis.of_held[i][k]);
+            let total = if let Role::Amount(i) = role { basis.of_held[i][k] } else { 0.0 };
             total - (0..basis.of.len()).map(|i| basis.of_held[i][k] * dissolved(i)).sum::<f64>()
         }
         None => dissolved(i),
     };
-    let given = |i: usize| f64::from(u8::from(arg == layout.amount(i)));
+    let given = |i: usize| f64::from(u8::from(role == Role::Amount(i)));
     let all = 0..basis.of.len();
     match part {
         Part::Amount(i) => amount(i as usize),
         Part::Activity(i) => {
-            let (i, temperature) = (i as usize, point.x[places.temperature()]);
+            let i = i as usize;
             let formed: f64 = problem.masters_of(i).map(|(c, of)| of * direction.step[c]).sum();
             // What makes activities of amounts moves the amount, not the activity.
-            let constant = if arg < super::Layout::ACTIVITIES { 0.0 } else { direction.grown[i] };
-            let rise = problem.constant_rise(i, &point.state, temperature);
+            let moves_amounts = matches!(role, Role::Activities(_) | Role::Coefficient(..));
+            let constant = if moves_amounts { 0.0 } else { direction.grown[i] };
+            let rise = point.state.rises[i];
             formed + constant + rise * direction.step[places.temperature()]
         }
         Part::Temperature => direction.step[places.temperature()],
         Part::Strength => direction.step[places.strength()],
         Part::Heat => {
-            let by_enthalpy = |i: usize| {
-                let r = arg.checked_sub(layout.enthalpy(0)).filter(|r| *r < problem.system.equations().len());
-                r.map_or(0.0, |r| by_equation(basis, i, r) * (point.state.amounts[i] - problem.given(i)))
+            let by_enthalpy = |i: usize| match role {
+                Role::Enthalpy(r) => by_equation(basis, i, r) * (point.state.amounts[i] - problem.given(i)),
+                _ => 0.0,
             };
             all.map(|i| point.state.enthalpies[i] * (dissolved(i) - given(i)) + by_enthalpy(i)).sum()
         }
         Part::Capacity => {
             let capacity = |i: usize| problem.args[layout.capacity_of(i)];
-            let by_capacity = |i: usize| match arg == layout.capacity_of(i) {
-                true => taken(problem, point, i),
-                false => 0.0,
+            let by_capacity = |i: usize| match role {
+                Role::CapacityOf(of) if of == i => taken(problem, point, i),
+                _ => 0.0,
             };
             all.map(|i| capacity(i) * (amount(i) - given(i)) + by_capacity(i)).sum()
         }

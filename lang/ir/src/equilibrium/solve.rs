@@ -10,11 +10,9 @@ use std::sync::Arc;
 
 use super::basis::Basis;
 use super::linear::{Factors, Matrix};
-use super::{Activities, Layout, Member, Phase, System, memo};
+use super::activity::{Activities, Coefficient, Coefficients};
+use super::{Layout, Member, Phase, System, memo};
 use crate::math;
-
-/// Gas constant, J/(mol*K).
-pub(super) const GAS: f64 = 8.314_462_618_153_24;
 
 /// ln 10.
 pub(super) const LN_10: f64 = std::f64::consts::LN_10;
@@ -104,13 +102,14 @@ impl Totals {
 /// What follows from the unknowns.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
-    /// By member: ln K of its formation.
+    /// By member: ln K of its formation, and how much that grows with temperature.
     pub(super) constants: Vec<f64>,
+    pub(super) rises: Vec<f64>,
     /// By member: enthalpy of its formation, J/mol, and the heat capacity that it takes, J/(mol*K).
     pub(super) enthalpies: Vec<f64>,
     pub(super) capacities: Vec<f64>,
-    /// By member: the logarithm of its activity coefficient, and its slopes by ionic strength and temperature.
-    pub(super) coefficients: Vec<[f64; 3]>,
+    /// By member.
+    pub(super) coefficients: Vec<Coefficient>,
     /// By member: mol.
     pub(super) amounts: Vec<f64>,
     /// By row: what adds to a total, and what it should be.
@@ -297,7 +296,7 @@ impl<'a> Problem<'a> {
         state.coefficients = (0..count).map(|i| self.coefficient(i, strength, temperature)).collect();
         state.amounts = vec![0.0; count];
         for &i in &basis.solutes {
-            let molality = self.activity(i, &state, x) - state.coefficients[i][0];
+            let molality = self.activity(i, &state, x) - state.coefficients[i].ln;
             state.amounts[i] = math::exp(molality + x[places.solvent()]);
         }
         state.amounts[basis.water] = math::exp(x[places.solvent()]) / self.system.written.solvent_mass;
@@ -320,12 +319,18 @@ impl<'a> Problem<'a> {
     /// Constants, enthalpies and heat capacities of formation.
     fn constants(&self, temperature: f64, state: &mut State) {
         let (basis, layout) = (&self.basis, self.layout);
-        let equations = self.system.written.equations.len();
-        let enthalpy = |r: usize| self.args[layout.enthalpy(r)];
-        let constant = |r: usize| self.args[layout.constant(r)] - enthalpy(r) / (GAS * temperature);
-        let (constants, enthalpies): (Vec<f64>, Vec<f64>) = (0..equations).map(|r| (constant(r), enthalpy(r))).unzip();
+        let equations = 0..self.system.written.equations.len();
+        let (terms, rises) = (terms(temperature), rises(temperature));
+        let sum_of = |r: usize, by: &[f64]| {
+            let of = &self.args[layout.constant(r)..layout.constant(r + 1)];
+            of.iter().zip(by).map(|(of, by)| of * by).sum::<f64>()
+        };
+        let constants: Vec<f64> = equations.clone().map(|r| sum_of(r, &terms)).collect();
+        let steepness: Vec<f64> = equations.clone().map(|r| sum_of(r, &rises)).collect();
+        let enthalpies: Vec<f64> = equations.map(|r| self.args[layout.enthalpy(r)]).collect();
         let sum = |by: &[(usize, f64)], of: &[f64]| by.iter().map(|(r, by)| by * of[*r]).sum::<f64>();
         state.constants = basis.by.iter().map(|by| sum(by, &constants)).collect();
+        state.rises = basis.by.iter().map(|by| sum(by, &steepness)).collect();
         state.enthalpies = basis.by.iter().map(|by| sum(by, &enthalpies)).collect();
         let capacity = |i: usize| self.args[layout.capacity_of(i)];
         let takes = |i: usize| {
@@ -336,34 +341,13 @@ impl<'a> Problem<'a> {
         state.capacities = (0..basis.of.len()).map(takes).collect();
     }
 
-    /// The limiting slope of Debye and Hueckel at a temperature, and how it grows with that.
-    pub(super) fn limiting(&self, temperature: f64) -> (f64, f64) {
-        let [a, b, c] = self.activities.a;
-        let t = temperature - STANDARD;
-        (a + t * (b + t * c), b + 2.0 * t * c)
-    }
-
-    /// The shape of the law of activity at an ionic strength, and its slope.
-    pub(super) fn shape(&self, strength: f64) -> (f64, f64) {
-        let Activities { b, c, most, .. } = self.activities;
-        let root = strength.clamp(0.0, most).sqrt();
-        let by = 1.0 + b * root;
-        let slope = if strength >= most || root == 0.0 { 0.0 } else { 0.5 / (root * by * by) - c };
-        (root / by - c * root * root, slope)
-    }
-
-    /// The logarithm of an activity coefficient, and its slopes by ionic strength and temperature.
-    fn coefficient(&self, member: usize, strength: f64, temperature: f64) -> [f64; 3] {
+    fn coefficient(&self, member: usize, strength: f64, temperature: f64) -> Coefficient {
         let charge = self.system.members()[member].charge;
-        if charge == 0.0 {
-            let Activities { d, most, .. } = self.activities;
-            let slope = if strength < most { LN_10 * d } else { 0.0 };
-            return [LN_10 * d * strength.clamp(0.0, most), slope, 0.0];
-        }
-        let (limiting, rise) = self.limiting(temperature);
-        let (shape, slope) = self.shape(strength);
-        let by = -LN_10 * charge * charge;
-        [by * limiting * shape, by * limiting * slope, by * rise * shape]
+        self.coefficients(member).coefficient(&self.activities, charge, strength, temperature)
+    }
+
+    pub(super) fn coefficients(&self, member: usize) -> Coefficients {
+        Coefficients::of(self.args, self.layout, member)
     }
 
     /// What makes up each total, and that of the solvent.
@@ -401,10 +385,10 @@ impl<'a> Problem<'a> {
         let mut matrix = Matrix::new(places.count());
         for &i in &self.basis.solutes {
             let amount = state.amounts[i];
-            let warmth = self.constant_rise(i, state, x[places.temperature()]) - state.coefficients[i][2];
+            let warmth = state.rises[i] - state.coefficients[i].by_warmth;
             let others = [
                 (places.solvent(), 1.0),
-                (places.strength(), -state.coefficients[i][1]),
+                (places.strength(), -state.coefficients[i].by_strength),
                 (places.temperature(), warmth),
             ];
             self.each_row(i, state, |row, share| {
@@ -451,11 +435,6 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// How much ln K of the formation of a member grows with temperature.
-    pub(super) fn constant_rise(&self, member: usize, state: &State, temperature: f64) -> f64 {
-        state.enthalpies[member] / (GAS * temperature * temperature)
-    }
-
     /// How much the amount of a member that is no solid grows where the unknowns do.
     pub(super) fn growth(&self, step: &[f64], point: &Point, member: usize) -> f64 {
         let (places, state) = (self.places(), &point.state);
@@ -465,8 +444,8 @@ impl<'a> Problem<'a> {
             Phase::Solid => 0.0,
             Phase::Solute => {
                 let formed: f64 = self.masters_of(member).map(|(c, of)| of * step[c]).sum();
-                let [_, by_strength, by_warmth] = state.coefficients[member];
-                let rise = self.constant_rise(member, state, point.x[places.temperature()]) - by_warmth;
+                let Coefficient { by_strength, by_warmth, .. } = state.coefficients[member];
+                let rise = state.rises[member] - by_warmth;
                 let by_others = rise * step[places.temperature()] - by_strength * step[places.strength()];
                 amount * (formed + step[places.solvent()] + by_others)
             }
@@ -562,6 +541,16 @@ impl State {
     fn heated(&self, problem: &Problem<'_>) -> f64 {
         (problem.args[problem.layout.heat()] - self.heat) / self.capacity
     }
+}
+
+/// What the terms of ln K are multiples of, at a temperature.
+pub(super) fn terms(t: f64) -> [f64; Layout::TERMS] {
+    [1.0, 1.0 / t, math::ln(t), t, 1.0 / (t * t), t * t]
+}
+
+/// How these grow with temperature.
+fn rises(t: f64) -> [f64; Layout::TERMS] {
+    [0.0, -1.0 / (t * t), 1.0 / t, 1.0, -2.0 / (t * t * t), 2.0 * t]
 }
 
 /// The solution of a system for its arguments.

@@ -2,10 +2,14 @@ use super::*;
 
 const LN_10: f64 = std::f64::consts::LN_10;
 
+/// J/(mol*K).
+const GAS: f64 = 8.314_462_618_153_24;
+
 /// Builds systems by short texts.
 struct Sketch {
     written: Written,
-    constants: Vec<f64>,
+    /// The first two terms of each.
+    constants: Vec<[f64; 2]>,
     enthalpies: Vec<f64>,
 }
 
@@ -38,7 +42,7 @@ impl Sketch {
         let mut coefficients = vec![0.0; self.written.members.len()];
         found.into_iter().for_each(|(i, n)| coefficients[i] += n);
         self.written.equations.push(Equation { name: text.into(), coefficients });
-        self.constants.push(log * LN_10 + enthalpy * 1e3 / (solve::GAS * 298.15));
+        self.constants.push([log * LN_10 + enthalpy * 1e3 / (GAS * 298.15), -enthalpy * 1e3 / GAS]);
         self.enthalpies.push(enthalpy * 1e3);
         self
     }
@@ -47,9 +51,9 @@ impl Sketch {
         let system = System::try_from(self.written).unwrap();
         let layout = system.layout();
         let mut args = vec![0.0; layout.count()];
-        args[6] = 1e9;
+        args[MOST] = 1e9;
         for (r, (k, h)) in self.constants.iter().zip(&self.enthalpies).enumerate() {
-            args[layout.constant(r)] = *k;
+            args[layout.constant(r)..layout.constant(r) + 2].copy_from_slice(k);
             args[layout.enthalpy(r)] = *h;
         }
         args[layout.capacity()] = f64::INFINITY;
@@ -76,8 +80,20 @@ impl Mixture {
         self
     }
 
-    fn davies(mut self) -> Mixture {
-        self.args[..7].copy_from_slice(&[0.509, 0.0, 0.0, 1.0, 0.3, 0.0, 1e9]);
+    /// With activity coefficients.
+    fn real(mut self) -> Mixture {
+        self.args[..Layout::ACTIVITIES].copy_from_slice(&[0.509, 1e-3, 0.0, 0.3286, 1e-4, 1e9]);
+        let layout = self.system.layout();
+        for (i, member) in self.system.members().iter().enumerate() {
+            let numbers = match (member.charge != 0.0, i % 3) {
+                (false, _) => [0.0, 0.0, 0.0, 0.1],
+                // Some by the law of Truesdell and Jones, the rest by that of Davies.
+                (true, 0) => [0.0, 4.5, 0.0, 0.05],
+                (true, _) => [1.0, 0.0, 0.3, 0.0],
+            };
+            let at = layout.coefficients(i);
+            self.args[at..at + Layout::COEFFICIENTS].copy_from_slice(&numbers);
+        }
         self
     }
 
@@ -107,6 +123,9 @@ fn acids() -> Sketch {
 }
 
 const WATER: f64 = 55.508;
+
+/// The argument that is the largest ionic strength of the law of activity.
+const MOST: usize = Layout::ACTIVITIES - 1;
 
 #[test]
 fn pure_water_is_neutral() {
@@ -160,8 +179,8 @@ fn random(seed: u64) -> Mixture {
     }
     mixture.args[layout.amount(0)] = size * (1.0 + 50.0 * draw());
     if seed.is_multiple_of(2) {
-        mixture = mixture.davies();
-        mixture.args[6] = 1.0;
+        mixture = mixture.real();
+        mixture.args[MOST] = 1.0;
     }
     if seed.is_multiple_of(3) {
         mixture.args[layout.capacity()] = 75.0 * mixture.args[layout.amount(0)];
@@ -209,7 +228,7 @@ fn slopes_are_those_of_differences() {
             system.slopes(part, &mixture.args, &all, &mut slopes);
             for arg in all {
                 let value = mixture.args[arg];
-                if !value.is_finite() || value == 0.0 || arg == 6 {
+                if !value.is_finite() || value == 0.0 || arg == MOST {
                     continue;
                 }
                 let step = 1e-5 * value.abs();
