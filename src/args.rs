@@ -71,6 +71,8 @@ pub enum Command {
     Discover(DiscoverArgs),
     /// Write a workflow as a file that another program runs.
     Emit(EmitArgs),
+    /// Write a file of another program as a module of the language.
+    Import(ImportArgs),
     /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
     Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
@@ -583,6 +585,33 @@ pub struct EmitArgs {
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
+}
+
+/// What can be imported.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Foreign {
+    /// A database of PHREEQC, as `phreeqc.dat` or `wateq4f.dat`: equilibria in water, with activity coefficients.
+    Phreeqc,
+}
+
+/// `matterixc import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// What kind of file it is.
+    #[arg(value_enum, value_name = "KIND")]
+    pub kind: Foreign,
+    /// The file.
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Take species of these elements only, beside hydrogen and oxygen: `Ca,C,Cl`.
+    #[arg(long, value_name = "ELEMENTS", value_delimiter = ',')]
+    pub elements: Vec<String>,
+    /// Take these solid phases, as the database calls them: `Calcite,Gypsum`. Without it no solid is taken, so that nothing precipitates.
+    #[arg(long, value_name = "PHASES", value_delimiter = ',')]
+    pub phases: Vec<String>,
+    /// Where to write the module; to standard output without it.
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// `matterixc verify`.

@@ -91,6 +91,7 @@ fn dispatch(cli: Cli) -> Exit {
         Command::Fit(args) => command::fit(&args, cli.color),
         Command::Doc(args) => command::doc(&args, cli.color),
         Command::Emit(args) => command::emit(&args, cli.color),
+        Command::Import(args) => command::import(&args),
         Command::Plan(args) => command::plan(&args, cli.color),
         Command::Deploy(args) => command::deploy(&args, cli.color),
         Command::Emulate(args) => command::emulate(&args, cli.color),

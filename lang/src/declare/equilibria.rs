@@ -10,9 +10,13 @@ use crate::ast::{Field, ItemKind};
 use crate::names::{Names, used};
 
 /// The fields of which each gives the constant of an equilibrium.
-pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp"];
+pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", ANALYTIC];
 
-const FIELDS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", "at", "enthalpy", "valid", "source"];
+/// The field that gives the constant at every temperature.
+pub const ANALYTIC: &str = "analytic";
+
+const FIELDS: &[&str] =
+    &["constant", "log_constant", "pka", "ksp", "pksp", ANALYTIC, "at", "enthalpy", "valid", "source"];
 
 /// An equilibrium whose species are all known.
 #[derive(Clone, Debug)]

@@ -104,6 +104,15 @@ impl<'a> Elaborator<'a> {
         }
     }
 
+    /// The value of a function of the text for arguments that are given as values; none where it has no body.
+    pub fn call_with(&mut self, id: DeclId, values: Vec<Value>) -> Option<Value> {
+        let decl = self.tables.names.decl(id);
+        let ItemKind::Fn { params, result, body: Some(body), name, .. } = &decl.item.kind else { return None };
+        let ty = result.as_ref().map_or(Type::Any, |ty| self.resolve_type(ty, decl.module));
+        let value = self.call_body(id, params, values, body, &ty, decl.module);
+        Some(self.coerce(value, &ty, body.span, &name.text))
+    }
+
     fn call_body(
         &mut self,
         id: DeclId,

@@ -9,14 +9,17 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
-use crate::declare::equilibria::CONSTANTS;
+use crate::declare::equilibria::{ANALYTIC, CONSTANTS};
 use crate::declare::species::field;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::{Elaborator, Mode};
+use crate::names::DeclId;
 use crate::units::Dimension;
 
 /// Gas constant, J/(mol*K).
 const GAS: f64 = 8.314_462_618_153_24;
+
+const LN_10: f64 = std::f64::consts::LN_10;
 
 /// The temperature at which constants are given, where nothing else is said, K.
 const STANDARD: f64 = 298.15;
@@ -28,8 +31,19 @@ pub const EQUILIBRIUM: &str = "equilibrium";
 /// The option that names the property of species which is their heat capacity.
 pub const CAPACITY: &str = "capacity_by";
 
+/// The option that names the function of a mixture and a species whose numbers are [`matterix_ir::equilibrium::Coefficients`].
+pub const COEFFICIENTS: &str = "coefficients_by";
+
 /// The first items of that are the heat content and the heat capacity.
 const HEAT_AND_CAPACITY: usize = 2;
+
+/// The constant of an equilibrium.
+struct Constant {
+    /// The terms of its logarithm, as [`Layout`] has them.
+    terms: [NodeId; Layout::TERMS],
+    /// Enthalpy at the standard temperature, J/mol.
+    enthalpy: NodeId,
+}
 
 /// The equilibria of one mixture.
 #[derive(Debug)]
@@ -161,14 +175,20 @@ impl<'a> Elaborator<'a> {
             *args.get_mut(i).filter(|_| i < Layout::ACTIVITIES)? = *node;
         }
         for (r, e) in equilibria.iter().enumerate() {
-            let [constant, enthalpy] = self.constants(*e)?;
-            (args[layout.constant(r)], args[layout.enthalpy(r)]) = (constant, enthalpy);
+            let Constant { terms, enthalpy } = self.constant_of(*e)?;
+            args[layout.constant(r)..layout.constant(r + 1)].copy_from_slice(&terms);
+            args[layout.enthalpy(r)] = enthalpy;
         }
+        let law = self.law_of_activity(id);
         let property = self.capacity_property(id);
         for (i, s) in members.iter().enumerate() {
             args[layout.amount(i)] = self.held(id, *s);
             if let Some(capacity) = property.as_ref().and_then(|p| self.capacity_of(*s, p)) {
                 args[layout.capacity_of(i)] = capacity;
+            }
+            if let Some(law) = law {
+                let at = layout.coefficients(i);
+                args[at..at + Layout::COEFFICIENTS].copy_from_slice(&self.coefficients_of(id, *s, law)?);
             }
         }
         args[layout.bystanders()] = self.bystanders(id, members);
@@ -256,6 +276,19 @@ impl<'a> Elaborator<'a> {
         Some((options.iter().find(|o| o.name.text == name)?, member))
     }
 
+    /// The function whose numbers the activity coefficients of a mixture follow.
+    fn law_of_activity(&mut self, id: InstanceId) -> Option<DeclId> {
+        let (option, member) = self.matter_option(id, COEFFICIENTS)?;
+        let ExprKind::Text(name) = &*option.value.kind else { return None };
+        self.lookup(member.module, name)
+    }
+
+    fn coefficients_of(&mut self, id: InstanceId, s: SpeciesId, law: DeclId) -> Option<[NodeId; Layout::COEFFICIENTS]> {
+        let Value::List(numbers) = self.call_with(law, vec![Value::Instance(id), Value::Species(s)])? else { return None };
+        let nodes: Vec<NodeId> = numbers.iter().map(|n| self.value_node(n)).collect::<Option<_>>()?;
+        nodes.try_into().ok()
+    }
+
     fn capacity_property(&self, id: InstanceId) -> Option<String> {
         let (option, _) = self.matter_option(id, CAPACITY)?;
         match &*option.value.kind {
@@ -272,34 +305,70 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// `ln K + enthalpy / (R T)` of an equilibrium, where T is that of its constant, and its enthalpy.
-    fn constants(&mut self, e: usize) -> Option<[NodeId; 2]> {
+    fn constant_of(&mut self, e: usize) -> Option<Constant> {
         let def = &self.tables.equilibria[e];
         let (name, fields, module) = (def.name.clone(), def.fields, def.module);
         let (key, given) = CONSTANTS.iter().find_map(|key| Some((*key, expr_of(fields, key)?)))?;
+        if key == ANALYTIC {
+            return self.analytic(given, module);
+        }
         let v = self.expr(given, &mut Scope::module(module));
         let Value::Num(n) = self.coerce(v, &Type::ratio(), given.span, key) else { return None };
         let n = self.name_param(&format!("{name}.{key}"), n, given.span);
-        let ln_10 = std::f64::consts::LN_10;
-        let log = |this: &mut Self, factor: f64| {
-            let factor = this.graph.number(factor);
-            this.graph.binary(BinaryOp::Mul, factor, n.node)
-        };
-        let constant = match key {
+        let ln_k = match key {
             "constant" | "ksp" => {
                 let node = self.graph.unary(UnaryOp::Ln, n.node);
                 self.note_place(node, given.span);
                 node
             }
-            "log_constant" => log(self, ln_10),
-            _ => log(self, -ln_10),
+            "log_constant" => self.multiple(LN_10, n.node),
+            _ => self.multiple(-LN_10, n.node),
         };
-        let Some(enthalpy) = self.enthalpy_of(e) else { return Some([constant, self.graph.number(0.0)]) };
+        let mut terms = [self.graph.number(0.0); Layout::TERMS];
+        terms[0] = ln_k;
+        let Some(enthalpy) = self.enthalpy_of(e) else { return Some(Constant { enthalpy: terms[1], terms }) };
+        // The law of van 't Hoff: ln K = ln K(at) + enthalpy / R (1 / at - 1 / T).
         let at = self.given_at(e)?;
         let gas = self.graph.number(GAS);
         let scale = self.graph.binary(BinaryOp::Mul, gas, at);
         let shift = self.graph.binary(BinaryOp::Div, enthalpy, scale);
-        Some([self.graph.binary(BinaryOp::Add, constant, shift), enthalpy])
+        terms[0] = self.graph.binary(BinaryOp::Add, ln_k, shift);
+        terms[1] = self.multiple(-1.0 / GAS, enthalpy);
+        Some(Constant { terms, enthalpy })
+    }
+
+    /// `log10 K = A1 + A2 T + A3 / T + A4 log10 T + A5 / T^2 + A6 T^2`, with the temperature T in K; those that are left out are 0.
+    fn analytic(&mut self, given: &'a Expr, module: usize) -> Option<Constant> {
+        let v = self.expr(given, &mut Scope::module(module));
+        let Value::List(numbers) = self.coerce(v, &Type::List(Type::ratio().into()), given.span, ANALYTIC) else {
+            return None;
+        };
+        if numbers.is_empty() || numbers.len() > Layout::TERMS {
+            let headline = format!("`analytic` has 1 to {} numbers, not {}", Layout::TERMS, numbers.len());
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, given.span, headline, "of log10 K");
+            self.report(d.help("log10 K = A1 + A2 T + A3 / T + A4 log10 T + A5 / T^2 + A6 T^2, with T in K"));
+            return None;
+        }
+        // Where each stands among the terms of ln K, and what it is multiplied by.
+        let places = [(0, LN_10), (3, LN_10), (1, LN_10), (2, 1.0), (4, LN_10), (5, LN_10)];
+        let mut terms = [self.graph.number(0.0); Layout::TERMS];
+        for (number, (place, factor)) in numbers.iter().zip(places) {
+            let node = self.value_node(number)?;
+            terms[place] = self.multiple(factor, node);
+        }
+        // What each term adds to the enthalpy, R T^2 d(ln K) / dT.
+        let t = STANDARD;
+        let mut enthalpy = self.graph.number(0.0);
+        for (term, by) in terms.into_iter().zip([0.0, -1.0, t, t * t, -2.0 / t, 2.0 * t * t * t]) {
+            let part = self.multiple(GAS * by, term);
+            enthalpy = self.graph.binary(BinaryOp::Add, enthalpy, part);
+        }
+        Some(Constant { terms, enthalpy })
+    }
+
+    fn multiple(&mut self, factor: f64, node: NodeId) -> NodeId {
+        let factor = self.graph.number(factor);
+        self.graph.binary(BinaryOp::Mul, factor, node)
     }
 
     fn enthalpy_of(&mut self, e: usize) -> Option<NodeId> {
@@ -348,8 +417,8 @@ impl<'a> Elaborator<'a> {
             self.coerce(v, &ty, valid.span, "valid");
         }
         let fields = self.tables.equilibria[e].fields;
-        let Some([constant, _]) = self.constants(e) else { return };
-        if self.glance(constant).is_none_or(f64::is_finite) {
+        let Some(Constant { terms, .. }) = self.constant_of(e) else { return };
+        if terms.iter().all(|term| self.glance(*term).is_none_or(f64::is_finite)) {
             return;
         }
         let span =
@@ -391,12 +460,13 @@ impl<'a> Elaborator<'a> {
         let part: Vec<(usize, f64)> = factors.iter().copied().enumerate().filter(|(_, f)| f.abs() > 1e-9).collect();
         let mut sum = 0.0;
         for (e, factor) in &part {
-            let Some([constant, enthalpy]) = self.constants(*e) else { return };
-            let at = |this: &mut Self, node| this.glance(node);
-            let (Some(constant), Some(enthalpy)) = (at(self, constant), at(self, enthalpy)) else { return };
-            sum += factor * (constant - enthalpy / (GAS * STANDARD));
+            let Some(Constant { terms, .. }) = self.constant_of(*e) else { return };
+            let Some(terms) = terms.iter().map(|term| self.glance(*term)).collect::<Option<Vec<f64>>>() else { return };
+            let of: [f64; Layout::TERMS] =
+                [1.0, 1.0 / STANDARD, STANDARD.ln(), STANDARD, STANDARD.powi(-2), STANDARD.powi(2)];
+            sum += factor * terms.iter().zip(of).map(|(term, of)| term * of).sum::<f64>();
         }
-        let off = (sum / std::f64::consts::LN_10).abs();
+        let off = (sum / LN_10).abs();
         if off <= CLOSED {
             return;
         }
@@ -461,7 +531,7 @@ impl<'a> Elaborator<'a> {
                 _ => None,
             };
         }
-        if expr_of(fields, "enthalpy").is_some() {
+        if expr_of(fields, "enthalpy").or_else(|| expr_of(fields, ANALYTIC)).is_some() {
             return Some((self.graph.number(LIQUID.0), self.graph.number(LIQUID.1)));
         }
         let (at, reach) = (self.given_at(e)?, self.graph.number(NEAR));

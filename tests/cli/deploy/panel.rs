@@ -107,7 +107,9 @@ fn events<'l>(journal: &'l [Value], name: &str) -> Vec<&'l Value> {
 
 #[test]
 fn people_answer_pause_and_go_on_over_the_page() {
-    let served = Served::begin("panel", STIR);
+    // It ends with a question: a page that has gone shows nothing.
+    let text = STIR.replace("timeout 1 h\n", "timeout 1 h\n    ask \"is all well?\"\n");
+    let served = Served::begin("panel", &text);
     let asked = served.until(|s| s["questions"].as_array().is_some_and(|q| !q.is_empty()));
     assert_eq!(asked["questions"][0]["text"], "add the reagent, then confirm");
     assert_eq!(asked["exposed"], json!(["plate"]));
@@ -122,10 +124,13 @@ fn people_answer_pause_and_go_on_over_the_page() {
     assert!(!served.state()["log"].to_string().contains("stir plate at 300 rpm"), "nothing begins in a pause");
     assert_eq!(served.acts(&json!({ "who": "Bo", "do": "go" })), 202);
     served.until(|s| s["devices"][0]["told"]["plate.temperature"].as_str().is_some_and(|t| t.ends_with("degC")));
+    let asked = served.until(|s| s["questions"][0]["text"] == "is all well?");
+    let last = &asked["questions"][0]["number"];
+    assert_eq!(served.acts(&json!({ "who": "Bo", "do": "yes", "question": last })), 202);
     let (code, said, journal) = served.end();
     assert_eq!(code, Some(0), "{said}");
     let answers = events(&journal, "answered");
-    assert!(answers.len() == 1 && answers[0]["yes"] == true && answers[0]["who"] == "Ann, on the page", "{answers:?}");
+    assert!(answers.len() == 2 && answers[0]["yes"] == true && answers[0]["who"] == "Ann, on the page", "{answers:?}");
     let gates: Vec<_> = events(&journal, "gate").iter().map(|l| (l["to"].clone(), l["who"].clone())).collect();
     assert_eq!(gates, [(json!("pause"), json!("Ann, on the page")), (json!("go"), json!("Bo, on the page"))]);
 }

@@ -380,7 +380,7 @@ impl<'a> Problem<'a> {
     }
 
     /// How conditions move with the unknowns.
-    fn jacobian(&self, x: &[f64], state: &State) -> Matrix {
+    fn jacobian(&self, state: &State) -> Matrix {
         let places = self.places();
         let mut matrix = Matrix::new(places.count());
         for &i in &self.basis.solutes {
@@ -477,7 +477,7 @@ impl<'a> Problem<'a> {
             }
             let is_near = off < NEAR && idle < PATIENCE || off < VERY_NEAR;
             let mut right: Vec<f64> = state.residuals.iter().map(|r| -r).collect();
-            let mut matrix = self.jacobian(&x, &state);
+            let mut matrix = self.jacobian(&state);
             if !is_near {
                 for row in [self.places().strength(), self.places().temperature()] {
                     (0..matrix.size).for_each(|column| *matrix.at(row, column) = f64::from(u8::from(column == row)));
@@ -672,7 +672,7 @@ fn finish(
     (solids, lacking): (&[f64], &[f64]),
 ) -> Option<Solution> {
     let (basis, places) = (problem.basis.clone(), problem.places());
-    let factors = problem.jacobian(&x, &state).factor()?;
+    let factors = problem.jacobian(&state).factor()?;
     let mut activities = vec![0.0; basis.of.len()];
     for i in basis.solutes.iter().chain(&basis.solids) {
         activities[*i] = problem.activity(*i, &state, &x);

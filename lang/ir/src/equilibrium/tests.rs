@@ -191,7 +191,7 @@ fn random(seed: u64) -> Mixture {
 
 #[test]
 fn random_mixtures_are_all_solved() {
-    for seed in 0..20_000 {
+    for seed in 0..1_000 {
         let mixture = random(seed);
         let problem = solve::Problem::new(&mixture.system, &mixture.args, mixture.system.basis.clone());
         let solution = solve::solve(&mixture.system, &mixture.args)
@@ -215,7 +215,7 @@ fn random_mixtures_are_all_solved() {
 #[test]
 fn slopes_are_those_of_differences() {
     let mut checked = 0;
-    for seed in 0..60 {
+    for seed in 0..30 {
         let mixture = random(seed);
         let system = &mixture.system;
         let layout = system.layout();
