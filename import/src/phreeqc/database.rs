@@ -122,10 +122,20 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
             return Err(mistake(line, "neither a reaction nor an option of one"));
         }
     }
+    last_of_each(&mut database.species);
+    last_of_each(&mut database.phases);
     match database.species.is_empty() && database.phases.is_empty() {
         true => Err(Mistake { line: 0, why: "it has no block SOLUTION_SPECIES or PHASES: it is no database of PHREEQC".into() }),
         false => Ok(database),
     }
+}
+
+/// What is defined again counts as it is defined last.
+fn last_of_each(all: &mut Vec<Entry>) {
+    let mut seen = BTreeSet::new();
+    all.reverse();
+    all.retain(|entry| seen.insert(entry.name.clone()));
+    all.reverse();
 }
 
 fn mistake(line: Line<'_>, why: impl Into<String>) -> Mistake {

@@ -202,8 +202,8 @@ fn reduced(written: &Written) -> Result<Reduced, Unsettled> {
     }
 }
 
-/// The member that an equation forms: a solid; else what stands alone on its side, so that totals of the rest count up; of several
-/// that which the fewest equations name.
+/// The member that an equation forms: a solid; else that which the fewest equations name, as a complex beside its ions; of several that
+/// which stands alone on its side, so that totals of the rest count up.
 fn pivot(written: &Written, row: &Row) -> Option<usize> {
     let phase = |i: usize| written.members[i].phase;
     let is_there = |i: &usize| row.members[*i] != 0.0 && phase(*i) != Phase::Solvent;
@@ -214,7 +214,7 @@ fn pivot(written: &Written, row: &Row) -> Option<usize> {
     let named = |i: usize| written.equations.iter().filter(|e| e.coefficients[i] != 0.0).count();
     let rank = |i: usize| {
         let alone = beside(i) == 1 && row.members[i].abs() == 1.0;
-        (phase(i) != Phase::Solid, !alone, named(i), usize::MAX - i)
+        (phase(i) != Phase::Solid, named(i), !alone, usize::MAX - i)
     };
     (0..row.members.len()).filter(is_there).min_by_key(|i| rank(*i))
 }

@@ -1,7 +1,8 @@
 //! Where totals, constants and the heat content are met.
 //!
 //! Newton's method on the logarithms of what makes each total up over what it should be: it is nearly linear in the logarithms of
-//! activities, however far off the start is, so that a handful of steps suffices between femtomoles and kilomoles. Solids are there
+//! activities, so that a handful of steps suffices between femtomoles and kilomoles. A start that is very far off is brought near by
+//! positive continuous fractions first (Carrayrou, Mose and Behra, AIChE J. 48 (2002) 894), each total by itself. Solids are there
 //! or not: those that came out below nothing leave, the one furthest above its constant comes, until neither is so. One that is there
 //! is a master whose activity is 1, like the solvent; two other ways were compared. Its amount as an unknown among logarithms makes
 //! Newton's method swing; a smooth form of "there or saturated" has slopes that are not those of the solution.
@@ -31,6 +32,10 @@ const CLOSE: f64 = 4e-15;
 
 /// How often Newton's method steps at most.
 const MOST_STEPS: usize = 200;
+
+/// Beyond this logarithm of a total over what it should be it is far off; so often it is brought nearer at most.
+const FAR: f64 = 8.0;
+const MOST_FRACTIONS: usize = 100;
 
 /// From here on activity coefficients move with the rest, unless that has led nowhere for so many steps.
 const NEAR: f64 = 0.3;
@@ -464,11 +469,44 @@ impl<'a> Problem<'a> {
         rows
     }
 
+    /// Brings each total near what it should be, one at a time: its master grows by the ratio, to the power that makes the least of its
+    /// members follow.
+    fn approach(&self, x: &mut [f64], totals: &Totals) {
+        let least: Vec<f64> = (0..self.basis.masters.len()).map(|c| self.least_part(c)).collect();
+        for _ in 0..MOST_FRACTIONS {
+            let state = self.state(x, totals);
+            let mut furthest = 0.0_f64;
+            for (c, least) in least.iter().enumerate() {
+                let [sum, wanted] = state.sides[c];
+                let off = math::ln(wanted / sum);
+                if !off.is_finite() {
+                    return;
+                }
+                furthest = furthest.max(off.abs());
+                // The further off it is, the bolder.
+                let bold = 0.9 - 0.8 * math::exp(-off.abs());
+                x[c] += math::ln(bold * math::exp((off / least).min(500.0)) + 1.0 - bold);
+            }
+            if furthest < FAR {
+                return;
+            }
+        }
+    }
+
+    /// The least of a master that a member has.
+    fn least_part(&self, c: usize) -> f64 {
+        let parts = self.basis.of.iter().map(|of| of[c]).filter(|part| *part > 0.0);
+        parts.fold(f64::INFINITY, f64::min)
+    }
+
     /// Newton's method; the unknowns and what follows from them. Far from the solution activity coefficients stay as they are while the
     /// rest moves, and then follow: what they would be along the way is of no use.
     fn newton(&self, mut x: Vec<f64>, totals: &Totals) -> Option<(Vec<f64>, State)> {
         let mut best: Option<(f64, Vec<f64>, State)> = None;
         let mut idle = 0;
+        if largest(&self.state(&x, totals).residuals[..self.basis.masters.len()]) > FAR {
+            self.approach(&mut x, totals);
+        }
         for count in 0..MOST_STEPS {
             let state = self.state(&x, totals);
             let off = largest(&state.residuals);

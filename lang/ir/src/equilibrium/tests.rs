@@ -255,3 +255,32 @@ fn slopes_are_those_of_differences() {
     }
     assert!(checked > 10_000);
 }
+
+/// Lead in water, with ions that hold several atoms of it.
+fn lead() -> Sketch {
+    Sketch::new()
+        .equation("-1 water 1 H+ 1 OH-", -14.0, 55.8)
+        .equation("-1 Ca++ -1 water 1 CaOH+ 1 H+", -12.78, 0.0)
+        .equation("-1 Pb++ -1 water 1 PbOH+ 1 H+", -7.71, 0.0)
+        .equation("-1 Pb++ -2 water 1 Pb(OH)2 2 H+", -17.12, 0.0)
+        .equation("-1 Pb++ -3 water 1 Pb(OH)3- 3 H+", -28.06, 0.0)
+        .equation("-1 Pb++ -4 water 1 Pb(OH)4-- 4 H+", -39.7, 0.0)
+        .equation("-2 Pb++ -1 water 1 Pb2OH+++ 1 H+", -6.36, 0.0)
+        .equation("-1 Pb++ -1 Cl- 1 PbCl+", 1.6, 18.3)
+        .equation("-1 Pb++ -2 Cl- 1 PbCl2", 1.8, 4.5)
+        .equation("-1 Pb++ -3 Cl- 1 PbCl3-", 1.7, 9.1)
+        .equation("-1 Pb++ -4 Cl- 1 PbCl4--", 1.38, 14.8)
+        .equation("-3 Pb++ -4 water 1 Pb3(OH)4++ 4 H+", -23.88, 0.0)
+}
+
+#[test]
+fn ions_of_several_atoms_are_solved() {
+    let mixture =
+        lead().build().with(&[("water", WATER), ("Pb++", 9.317e-5), ("Cl-", 1.71274e-3), ("Ca++", 7.632e-4)]);
+    assert!((mixture.ph() - 6.0).abs() < 0.5, "{}", mixture.ph());
+    for seed in 0..300_u32 {
+        let of = |k: u32| 10f64.powf(-7.0 + 6.0 * f64::from((seed * 37 + k * 101) % 113) / 113.0);
+        let all = [("water", WATER), ("Pb++", of(1)), ("Cl-", of(2)), ("OH-", of(3)), ("H+", of(4))];
+        assert!(lead().build().real().with(&all).ph().is_finite(), "{seed}");
+    }
+}
