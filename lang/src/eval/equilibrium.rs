@@ -191,7 +191,9 @@ impl<'a> Elaborator<'a> {
                 args[at..at + Layout::COEFFICIENTS].copy_from_slice(&self.coefficients_of(id, *s, law)?);
             }
         }
-        args[layout.bystanders()] = self.bystanders(id, members);
+        let ions = self.bystanders(id, members);
+        args[layout.bystanders()] = self.weighed(id, &ions, |charge| 0.5 * charge * charge);
+        args[layout.bystander_amount()] = self.weighed(id, &ions, |_| 1.0);
         match temperature {
             Some(temperature) => {
                 args[layout.capacity()] = self.graph.number(f64::INFINITY);
@@ -233,18 +235,20 @@ impl<'a> Elaborator<'a> {
         sum
     }
 
-    /// Half the sum of amount times charge squared over the ions that are in no equilibrium.
-    fn bystanders(&mut self, id: InstanceId, members: &[SpeciesId]) -> NodeId {
-        let here: Vec<(SpeciesId, u32)> = self.amounts_in(id).collect();
+    /// The ions that are in no equilibrium, with their charges.
+    fn bystanders(&self, id: InstanceId, members: &[SpeciesId]) -> Vec<(SpeciesId, f64)> {
+        let charge = |s: SpeciesId| self.tables.species.get(s).formula.as_ref().map_or(0, |f| f.charge);
+        let others = self.amounts_in(id).filter(|(s, _)| !members.contains(s));
+        others.map(|(s, _)| (s, f64::from(charge(s)))).filter(|(_, charge)| *charge != 0.0).collect()
+    }
+
+    /// The sum of amounts, each by a weight of its charge.
+    fn weighed(&mut self, id: InstanceId, ions: &[(SpeciesId, f64)], weight: impl Fn(f64) -> f64) -> NodeId {
         let mut sum = self.graph.number(0.0);
-        for (s, _) in here.into_iter().filter(|(s, _)| !members.contains(s)) {
-            let charge = self.tables.species.get(s).formula.as_ref().map_or(0, |f| f.charge);
-            if charge != 0 {
-                let amount = self.held(id, s);
-                let weight = self.graph.number(0.5 * f64::from(charge * charge));
-                let part = self.graph.binary(BinaryOp::Mul, weight, amount);
-                sum = self.graph.binary(BinaryOp::Add, sum, part);
-            }
+        for (s, charge) in ions {
+            let amount = self.held(id, *s);
+            let part = self.multiple(weight(*charge), amount);
+            sum = self.graph.binary(BinaryOp::Add, sum, part);
         }
         sum
     }

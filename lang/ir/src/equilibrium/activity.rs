@@ -4,12 +4,14 @@ use super::Layout;
 use super::solve::{LN_10, STANDARD};
 
 /// What all coefficients of a mixture follow: `A = a0 + a1 t + a2 t^2` and `B = b0 + b1 t` with `t = T - 298.15 K`. Above an ionic
-/// strength of `most`, in mol/kg, coefficients are those at `most`.
+/// strength of `most`, in mol/kg, coefficients are those at `most`. Each mol/kg of what is dissolved lowers the logarithm of the activity
+/// of the solvent by `lowering`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Activities {
     a: [f64; 3],
     b: [f64; 2],
     most: f64,
+    pub(super) lowering: f64,
 }
 
 /// What is of one member: `log10 gamma = -A z^2 (sqrt(I) / (1 + (plain + B size) sqrt(I)) - common I) + own I`.
@@ -33,7 +35,7 @@ pub(super) struct Coefficient {
 
 impl Activities {
     pub(super) fn of(args: &[f64]) -> Activities {
-        Activities { a: [args[0], args[1], args[2]], b: [args[3], args[4]], most: args[5] }
+        Activities { a: [args[0], args[1], args[2]], b: [args[3], args[4]], most: args[5], lowering: args[6] }
     }
 
     fn strength(&self, strength: f64) -> f64 {
@@ -82,7 +84,7 @@ impl Coefficients {
         let shape = root / over - self.common * strength;
         let (by_a, by_b) = (-shape, a * self.size * strength / (over * over));
         let t = temperature - STANDARD;
-        LN_10 * charge * charge * [by_a, by_a * t, by_a * t * t, by_b, by_b * t, 0.0][which]
+        LN_10 * charge * charge * [by_a, by_a * t, by_a * t * t, by_b, by_b * t, 0.0, 0.0][which]
     }
 
     /// How the logarithm grows with one of its own numbers.

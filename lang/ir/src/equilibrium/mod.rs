@@ -31,7 +31,7 @@ use solve::Solution;
 /// Where a member is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Phase {
-    /// It is what others are dissolved in, and its activity is 1. There is one.
+    /// It is what others are dissolved in. There is one.
     Solvent,
     /// Dissolved: its activity is its molality times a coefficient.
     Solute,
@@ -131,7 +131,7 @@ pub struct Layout {
 
 impl Layout {
     /// Numbers of [`Activities`].
-    pub const ACTIVITIES: usize = 6;
+    pub const ACTIVITIES: usize = 7;
 
     /// Numbers of [`Coefficients`], of each member.
     pub const COEFFICIENTS: usize = 4;
@@ -179,19 +179,24 @@ impl Layout {
         self.amount(self.members)
     }
 
+    /// The amount of these, mol.
+    pub fn bystander_amount(self) -> usize {
+        self.bystanders() + 1
+    }
+
     /// Heat content, J.
     pub fn heat(self) -> usize {
-        self.bystanders() + 1
+        self.bystanders() + 2
     }
 
     /// Heat capacity of all as it was put there, J/K; without end where the temperature is given.
     pub fn capacity(self) -> usize {
-        self.bystanders() + 2
+        self.bystanders() + 3
     }
 
     /// The temperature at which heat contents are 0, K, or the one that is given.
     pub fn reference(self) -> usize {
-        self.bystanders() + 3
+        self.bystanders() + 4
     }
 
     /// What an argument is.
@@ -212,7 +217,8 @@ impl Layout {
         } else if arg < self.bystanders() {
             Role::Amount(arg - self.amount(0))
         } else {
-            [Role::Bystanders, Role::Heat, Role::Capacity, Role::Reference][arg - self.bystanders()]
+            let last = [Role::Bystanders, Role::BystanderAmount, Role::Heat, Role::Capacity, Role::Reference];
+            last[arg - self.bystanders()]
         }
     }
 }
@@ -227,6 +233,7 @@ enum Role {
     CapacityOf(usize),
     Amount(usize),
     Bystanders,
+    BystanderAmount,
     Heat,
     Capacity,
     Reference,

@@ -4,6 +4,9 @@ use super::basis::Basis;
 use super::solve::{Point, Problem, Solution, terms};
 use super::{Member, Part, Phase, Role, System};
 
+/// The number of the activity of the solvent among [`super::Activities`].
+const LOWERING: usize = super::Layout::ACTIVITIES - 1;
+
 /// Slopes of one solution, found as they are asked for.
 #[derive(Debug, Default)]
 pub(super) struct Slopes {
@@ -62,6 +65,10 @@ fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
     let around = (point.x[places.strength()], point.x[places.temperature()]);
     let count = basis.of.len();
     match problem.layout.role(arg) {
+        Role::Activities(LOWERING) => {
+            let molality = point.x[places.molality()];
+            (0..count).map(|i| -basis.solvent[i] * molality).collect()
+        }
         Role::Activities(which) => (0..count)
             .map(|i| match problem.system.members()[i] {
                 Member { phase: Phase::Solute, charge, .. } => {
@@ -129,7 +136,8 @@ fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
                 rows[warmth] += (state.enthalpies[i] + state.capacities[i] * state.warmer) / scale;
             }
         }
-        Role::Bystanders => rows[places.strength()] -= problem.strength_by_charges(state),
+        Role::Bystanders => rows[places.strength()] -= problem.by_amount(state.charges, state),
+        Role::BystanderAmount => rows[places.molality()] -= problem.by_amount(state.dissolved, state),
         Role::Reference if isothermal => rows[warmth] -= 1.0,
         _ if isothermal => {}
         Role::Heat => rows[warmth] += 1.0 / scale,
@@ -170,10 +178,10 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
             let i = i as usize;
             let formed: f64 = problem.masters_of(i).map(|(c, of)| of * direction.step[c]).sum();
             // What makes activities of amounts moves the amount, not the activity.
-            let moves_amounts = matches!(role, Role::Activities(_) | Role::Coefficient(..));
+            let moves_amounts = matches!(role, Role::Activities(0..LOWERING) | Role::Coefficient(..));
             let constant = if moves_amounts { 0.0 } else { direction.grown[i] };
-            let rise = point.state.rises[i];
-            formed + constant + rise * direction.step[places.temperature()]
+            let rise = point.state.rises[i] * direction.step[places.temperature()];
+            formed + constant + rise + problem.dryness(i) * direction.step[places.molality()]
         }
         Part::Temperature => direction.step[places.temperature()],
         Part::Strength => direction.step[places.strength()],

@@ -82,7 +82,7 @@ pub(super) struct Solution {
 pub(super) struct Point {
     /// The basis with the solids that are there.
     pub(super) basis: Arc<Basis>,
-    /// Logarithms of the activities of masters, that of the mass of solvent, ionic strength, temperature.
+    /// Logarithms of the activities of masters, that of the mass of solvent, ionic strength, molality of all that is dissolved, temperature.
     pub(super) x: Vec<f64>,
     pub(super) totals: Totals,
     pub(super) state: State,
@@ -126,6 +126,8 @@ pub(super) struct State {
     pub(super) warmer: f64,
     /// Half the sum of amount times charge squared, mol.
     pub(super) charges: f64,
+    /// All that is dissolved, mol.
+    pub(super) dissolved: f64,
     /// How far each condition is from being met.
     pub(super) residuals: Vec<f64>,
 }
@@ -145,12 +147,16 @@ impl Places {
         self.masters + 1
     }
 
-    pub(super) fn temperature(self) -> usize {
+    pub(super) fn molality(self) -> usize {
         self.masters + 2
     }
 
-    pub(super) fn count(self) -> usize {
+    pub(super) fn temperature(self) -> usize {
         self.masters + 3
+    }
+
+    pub(super) fn count(self) -> usize {
+        self.masters + 4
     }
 }
 
@@ -286,8 +292,10 @@ impl<'a> Problem<'a> {
         let solutes = self.basis.solutes.iter();
         let ions: f64 = solutes.map(|i| 0.5 * charge(*i) * charge(*i) * self.given(*i).max(0.0)).sum();
         let strength = (ions + self.args[self.layout.bystanders()]) / solvent + 1e-7;
+        let solutes: f64 = self.basis.solutes.iter().map(|i| self.given(*i).max(0.0)).sum();
+        let molality = (solutes + self.args[self.layout.bystander_amount()]) / solvent + 1e-7;
         let mut x: Vec<f64> = (0..self.basis.masters.len()).map(free).collect();
-        x.extend([math::ln(solvent), strength, temperature]);
+        x.extend([math::ln(solvent), strength, molality, temperature]);
         x
     }
 
@@ -310,15 +318,25 @@ impl<'a> Problem<'a> {
         let charge = |i: &usize| self.system.members()[*i].charge;
         let charges: f64 = basis.solutes.iter().map(|i| 0.5 * charge(i) * charge(i) * state.amounts[*i]).sum();
         state.charges = charges + self.args[self.layout.bystanders()];
-        let per_mass = self.charges_per_mass(&state);
-        state.residuals.push((strength - per_mass) / (per_mass + NO_IONS));
+        let dissolved: f64 = basis.solutes.iter().map(|i| state.amounts[*i]).sum();
+        state.dissolved = dissolved + self.args[self.layout.bystander_amount()];
+        for (place, sum) in self.sums(&state) {
+            let per_mass = self.per_mass(sum, &state);
+            state.residuals.push((x[place] - per_mass) / (per_mass + NO_IONS));
+        }
         state.residuals.push(self.energy_residual(&state));
         state
     }
 
     /// The logarithm of the activity of a dissolved member; how far a solid is above its constant.
     pub(super) fn activity(&self, member: usize, state: &State, x: &[f64]) -> f64 {
-        state.constants[member] + self.masters_of(member).map(|(c, of)| of * x[c]).sum::<f64>()
+        let solvent = self.dryness(member) * x[self.places().molality()];
+        state.constants[member] + self.masters_of(member).map(|(c, of)| of * x[c]).sum::<f64>() + solvent
+    }
+
+    /// How much the logarithm of the activity of a member grows with the molality of all that is dissolved, as the solvent in it has less.
+    pub(super) fn dryness(&self, member: usize) -> f64 {
+        -self.activities.lowering * self.basis.solvent[member]
     }
 
     /// Constants, enthalpies and heat capacities of formation.
@@ -394,6 +412,7 @@ impl<'a> Problem<'a> {
             let others = [
                 (places.solvent(), 1.0),
                 (places.strength(), -state.coefficients[i].by_strength),
+                (places.molality(), self.dryness(i)),
                 (places.temperature(), warmth),
             ];
             self.each_row(i, state, |row, share| {
@@ -404,24 +423,29 @@ impl<'a> Problem<'a> {
         }
         let water = self.basis.water;
         self.each_row(water, state, |row, share| *matrix.at(row, places.solvent()) += share * state.amounts[water]);
-        let per_mass = self.charges_per_mass(state);
-        let row = places.strength();
-        *matrix.at(row, places.strength()) += 1.0 / (per_mass + NO_IONS);
-        *matrix.at(row, places.solvent()) += per_mass / (per_mass + NO_IONS);
+        for (row, sum) in self.sums(state) {
+            let per_mass = self.per_mass(sum, state);
+            *matrix.at(row, row) += 1.0 / (per_mass + NO_IONS);
+            *matrix.at(row, places.solvent()) += per_mass / (per_mass + NO_IONS);
+        }
         let by_warmth = if self.is_isothermal() { 1.0 } else { -state.capacity / self.energy_scale() };
         *matrix.at(places.temperature(), places.temperature()) += by_warmth;
         matrix
     }
 
-    /// Ions per mass of solvent, as the ionic strength counts them.
-    fn charges_per_mass(&self, state: &State) -> f64 {
-        state.charges / (state.amounts[self.basis.water] * self.system.written.solvent_mass)
+    /// What the ionic strength and the molality of all are made of, by their unknowns: mol.
+    fn sums(&self, state: &State) -> [(usize, f64); 2] {
+        [(self.places().strength(), state.charges), (self.places().molality(), state.dissolved)]
     }
 
-    /// How much the ionic strength should grow with half an amount times its charge squared, as a share of itself.
-    pub(super) fn strength_by_charges(&self, state: &State) -> f64 {
-        let solvent = state.amounts[self.basis.water] * self.system.written.solvent_mass;
-        1.0 / (solvent * (self.charges_per_mass(state) + NO_IONS))
+    /// So much per mass of solvent, mol/kg.
+    fn per_mass(&self, amount: f64, state: &State) -> f64 {
+        amount / (state.amounts[self.basis.water] * self.system.written.solvent_mass)
+    }
+
+    /// How much the molality of such an amount should grow with it, as a share of itself.
+    pub(super) fn by_amount(&self, amount: f64, state: &State) -> f64 {
+        self.per_mass(1.0, state) / (self.per_mass(amount, state) + NO_IONS)
     }
 
     /// The conditions that move with the amount of a member, and by how much.
@@ -431,8 +455,9 @@ impl<'a> Problem<'a> {
             visit(*row, of / state.sides[*row][usize::from(*of < 0.0)]);
         }
         let Member { charge, phase, .. } = self.system.members()[member];
-        if charge != 0.0 && phase == Phase::Solute {
-            visit(places.strength(), -0.5 * charge * charge * self.strength_by_charges(state));
+        if phase == Phase::Solute {
+            visit(places.strength(), -0.5 * charge * charge * self.by_amount(state.charges, state));
+            visit(places.molality(), -self.by_amount(state.dissolved, state));
         }
         if !self.is_isothermal() {
             let heat = state.enthalpies[member] + state.capacities[member] * state.warmer;
@@ -451,7 +476,8 @@ impl<'a> Problem<'a> {
                 let formed: f64 = self.masters_of(member).map(|(c, of)| of * step[c]).sum();
                 let Coefficient { by_strength, by_warmth, .. } = state.coefficients[member];
                 let rise = state.rises[member] - by_warmth;
-                let by_others = rise * step[places.temperature()] - by_strength * step[places.strength()];
+                let by_solvent = self.dryness(member) * step[places.molality()];
+                let by_others = rise * step[places.temperature()] - by_strength * step[places.strength()] + by_solvent;
                 amount * (formed + step[places.solvent()] + by_others)
             }
         }
@@ -517,7 +543,8 @@ impl<'a> Problem<'a> {
             let mut right: Vec<f64> = state.residuals.iter().map(|r| -r).collect();
             let mut matrix = self.jacobian(&state);
             if !is_near {
-                for row in [self.places().strength(), self.places().temperature()] {
+                let places = self.places();
+                for row in [places.strength(), places.molality(), places.temperature()] {
                     (0..matrix.size).for_each(|column| *matrix.at(row, column) = f64::from(u8::from(column == row)));
                     right[row] = 0.0;
                 }
@@ -533,11 +560,12 @@ impl<'a> Problem<'a> {
                 break;
             }
             self.step(&mut x, &step, LONGEST / (1.0 + count as f64 / 12.0));
-            if let Some((strength, temperature)) = follows {
+            if let Some((sums, temperature)) = follows {
                 // What swings is held the more firmly the longer it does.
                 let share = 0.5 / (1.0 + count as f64 / 20.0);
-                let known = &mut x[self.places().strength()];
-                *known *= math::pow((strength + NO_IONS) / *known, share);
+                for (place, sum) in sums {
+                    x[place] *= math::pow((sum + NO_IONS) / x[place], share);
+                }
                 let known = &mut x[self.places().temperature()];
                 let limits = (TEMPERATURES.0.max(*known - WARMEST_STEP), TEMPERATURES.1.min(*known + WARMEST_STEP));
                 *known = (*known + share * (temperature - *known)).clamp(limits.0, limits.1);
@@ -546,10 +574,11 @@ impl<'a> Problem<'a> {
         best.filter(|(off, ..)| *off <= MET).map(|(_, x, state)| (x, state))
     }
 
-    /// The ionic strength and the temperature that amounts make.
-    fn surroundings(&self, state: &State) -> (f64, f64) {
+    /// The ionic strength, the molality of all and the temperature that amounts make.
+    fn surroundings(&self, state: &State) -> ([(usize, f64); 2], f64) {
         let warmer = if self.is_isothermal() { 0.0 } else { state.heated(self) };
-        (self.charges_per_mass(state), self.reference() + warmer)
+        let sums = self.sums(state).map(|(place, sum)| (place, self.per_mass(sum, state)));
+        (sums, self.reference() + warmer)
     }
 
     fn step(&self, x: &mut [f64], step: &[f64], most: f64) {
@@ -557,9 +586,10 @@ impl<'a> Problem<'a> {
         let longest = step[..=places.solvent()].iter().fold(0.0_f64, |most, s| most.max(s.abs()));
         let warmest = step[places.temperature()].abs();
         let share = 1.0_f64.min(most / longest).min(WARMEST_STEP / warmest);
-        let before = x[places.strength()];
+        let sums = [places.strength(), places.molality()];
+        let before = sums.map(|place| x[place]);
         x.iter_mut().zip(step).for_each(|(x, step)| *x += share * step);
-        x[places.strength()] = x[places.strength()].max(0.1 * before);
+        sums.iter().zip(before).for_each(|(place, before)| x[*place] = x[*place].max(0.1 * before));
         let temperature = &mut x[places.temperature()];
         *temperature = temperature.clamp(TEMPERATURES.0, TEMPERATURES.1);
     }
@@ -712,7 +742,7 @@ fn finish(
     let (basis, places) = (problem.basis.clone(), problem.places());
     let factors = problem.jacobian(&state).factor()?;
     let mut activities = vec![0.0; basis.of.len()];
-    for i in basis.solutes.iter().chain(&basis.solids) {
+    for i in basis.solutes.iter().chain(&basis.solids).chain([&basis.water]) {
         activities[*i] = problem.activity(*i, &state, &x);
     }
     let mut amounts = state.amounts.clone();

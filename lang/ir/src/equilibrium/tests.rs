@@ -82,7 +82,7 @@ impl Mixture {
 
     /// With activity coefficients.
     fn real(mut self) -> Mixture {
-        self.args[..Layout::ACTIVITIES].copy_from_slice(&[0.509, 1e-3, 0.0, 0.3286, 1e-4, 1e9]);
+        self.args[..Layout::ACTIVITIES].copy_from_slice(&[0.509, 1e-3, 0.0, 0.3286, 1e-4, 1e9, 0.017]);
         let layout = self.system.layout();
         for (i, member) in self.system.members().iter().enumerate() {
             let numbers = match (member.charge != 0.0, i % 3) {
@@ -125,7 +125,7 @@ fn acids() -> Sketch {
 const WATER: f64 = 55.508;
 
 /// The argument that is the largest ionic strength of the law of activity.
-const MOST: usize = Layout::ACTIVITIES - 1;
+const MOST: usize = Layout::ACTIVITIES - 2;
 
 #[test]
 fn pure_water_is_neutral() {
