@@ -1,4 +1,5 @@
-"""Compares equilibria with PHREEQC on mixtures drawn by a seed: the same database, imported, and the same law of activity.
+"""Compares equilibria with PHREEQC on mixtures drawn by a seed: the same database, imported, and the same law of
+activity.
 
     equilibria.py MATTERIXC FOLDER [CASES [SEED]]
 
@@ -36,7 +37,7 @@ SOLIDS = {
 STRONGEST = 0.5
 # Species below this are not compared, mol/kg.
 TRACE = 1e-10
-PH, SHARE = 0.01, 0.01
+PH, SHARE, INDEX = 0.01, 0.01, 0.01
 
 
 def draw(rng, reagents):
@@ -64,18 +65,31 @@ def gammas(database):
     return found
 
 
-def differing(database, library):
-    """Ions whose activity the library has from a later database."""
-    theirs, off = gammas(database), set()
+def with_library(database, library):
+    """The database with what the library says of activity coefficients, which may come from a later one; and the ions that this changes."""
+    theirs, said, changed = gammas(database), {}, []
     for name, body in re.findall(r"^species (\S+) \{\n(.*?)^\}", library, re.S | re.M):
         formula = re.search(r'formula: "(.*?)"', body)
         size, slope = re.search(r"ion_size: (\S+) nm", body), re.search(r"salting: (\S+)", body)
-        known = theirs.get(charged(formula.group(1))) if formula else None
-        if known and slope:
-            mine = (10 * float(size.group(1)) if size else 0.0, float(slope.group(1)))
-            if max(abs(a - b) for a, b in zip(mine, known)) > 1e-6:
-                off.add(name)
-    return off
+        if formula and slope:
+            key = charged(formula.group(1))
+            said[key] = (10 * float(size.group(1)) if size else 0.0, float(slope.group(1)))
+            if theirs.get(key) != said[key]:
+                changed.append(name)
+    out, species, block = [], None, None
+    for line in database.split("\n"):
+        words = line.split("#")[0].split()
+        if words and re.fullmatch("[A-Z_]{3,}", words[0]):
+            block, species = words[0], None
+        is_reaction = block == "SOLUTION_SPECIES" and "=" in words
+        if is_reaction:
+            species = written(re.sub(r"^[\d.]+", "", words[words.index("=") + 1].rstrip(";")))
+        if species in said and words[:1] == ["-gamma"]:
+            continue
+        out.append(line)
+        if is_reaction and species in said:
+            out.append("\t-gamma {} {}".format(*said[species]))
+    return "\n".join(out), sorted(changed)
 
 
 def theirs(engine, case):
@@ -157,11 +171,13 @@ def main():
     rng = random.Random(int(sys.argv[4]) if len(sys.argv) > 4 else 1)
     folder.mkdir(parents=True, exist_ok=True)
     data = pathlib.Path(phreeqpython.__file__).parent / "database" / "phreeqc.dat"
-    engine = phreeqpython.PhreeqPython(database="phreeqc.dat")
     library = pathlib.Path("stdlib/species.mtx").read_text()
-    other = differing(data.read_text(encoding="latin1"), library)
-    reagents = sorted(name for name, ions in REAGENTS.items() if not other & set(ions))
-    print(f"left aside, for their activity is from a later database: {sorted(other)}")
+    database, changed = with_library(data.read_text(encoding="latin1"), library)
+    print(f"with the activity of a later database: {', '.join(changed)}")
+    (folder / "phreeqc.dat").write_text(database, encoding="latin1")
+    data = (folder / "phreeqc.dat").resolve()
+    engine = phreeqpython.PhreeqPython(database="phreeqc.dat", database_directory=folder.resolve())
+    reagents = sorted(REAGENTS)
     cases = [draw(rng, reagents) for _ in range(count)]
     for number, case in enumerate(cases):
         home = folder / f"case{number}"
@@ -201,7 +217,7 @@ def main():
             formed = here.get(f"{phase}(s)", 0.0) > 0
             solid_cases += formed
             index = solution.si(phase)
-            if formed and abs(index) > 1e-3 or not formed and index > 1e-3:
+            if formed and abs(index) > INDEX or not formed and index > INDEX:
                 complaints.append(f"{phase} {'forms' if formed else 'does not form'} at a saturation index of {index:.4f}")
         if complaints:
             off += 1
