@@ -1,10 +1,130 @@
-//! Equilibria, from text to what a run makes of them.
+//! Equilibria, from text to what a run makes of them, and databases that are imported.
 
-use crate::harness::{matterixc, root};
+use crate::harness::{flat, folder, matterixc, matterixc_in, root, write};
 
 #[test]
 fn acids_bases_buffers_and_salts_are_those_of_the_textbook() {
-    let file = root().join("tests/cases/equilibria.mtx");
-    let ran = matterixc(&["run", file.to_str().expect("the path is text")]);
+    for case in ["equilibria", "neutralisation"] {
+        let file = root().join(format!("tests/cases/{case}.mtx"));
+        let ran = matterixc(&["run", file.to_str().expect("the path is text")]);
+        assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    }
+}
+
+/// A lab with one cup, some equilibria before it.
+fn cup(equilibria: &str, holding: &str, expectations: &str) -> String {
+    format!(
+        "mtx 1\n{equilibria}\nuse std::glassware::Beaker250mL
+asset Cup: Beaker250mL {{ contents: {{ activities: debye_hueckel }} }}
+lab bench {{ ambient: 25 degC, cup = Cup at (0, 0, 0) m holding {holding} }}
+workflow look in bench {{
+    wait 1 s
+{expectations}}}\n"
+    )
+}
+
+const WATER: &str = "equilibrium water_splits: water <-> H+ + OH- { log_constant: -14 }";
+
+#[test]
+fn constants_are_written_in_one_way_at_a_time() {
+    let dir = folder("analytic");
+    let wrong = [
+        ("analytic: [1, 2, 3, 4, 5, 6, 7]", "equilibrium-form", "1 to 6 numbers, not 7"),
+        ("analytic: [-14], enthalpy: 55 kJ/mol", "unknown-field", "`enthalpy` follows from `analytic`"),
+        ("analytic: [-14], at: 20 degC", "unknown-field", "`at` follows from `analytic`"),
+        ("analytic: [-14], log_constant: -14", "unknown-field", "has two constants"),
+        ("analytic: -14", "", "analytic"),
+    ];
+    for (constant, code, why) in wrong {
+        let text = cup(&format!("equilibrium w: water <-> H+ + OH- {{ {constant} }}"), "100 g of water", "");
+        write(&dir, "cup.mtx", text);
+        let checked = matterixc_in(&dir, &["check", "cup.mtx"]);
+        let said = flat(&format!("{}{}", checked.out, checked.err));
+        assert!(checked.code == 1 && said.contains(code) && said.contains(why), "{constant}: {said}");
+    }
+}
+
+#[test]
+fn an_analytic_constant_moves_with_temperature() {
+    // log10 K of water by its analytic expression at 60 degC: -13.02, so that the pH is 6.51.
+    let water = "equilibrium w: water <-> H+ + OH- {
+    analytic: [293.29227, 0.1360833, -10576.913, -123.73158, 0, -6.996455e-5]\n}";
+    let dir = folder("warm");
+    write(&dir, "cup.mtx", cup(water, "100 g of water at 60 degC", "    expect acidity(cup.contents) in 6.50 .. 6.52\n"));
+    let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn ions_have_the_coefficients_of_their_size() {
+    // 0.1 mol/kg of NaCl and 1 mmol/kg of HCl: -log10(0.001 gamma) with gamma by Truesdell and Jones, 9 angstrom: A = 0.51, B = 0.3285.
+    let root_of_strength = 0.101_f64.sqrt();
+    let ph = 3.0 + 0.51 * root_of_strength / (1.0 + 0.3285 * 9.0 * root_of_strength);
+    let expected = format!("    expect acidity(cup.contents) in {:.4} .. {:.4}\n", ph - 5e-4, ph + 5e-4);
+    let dir = folder("sizes_of_ions");
+    write(&dir, "cup.mtx", cup(WATER, "1 g of water + 0.1 mmol of NaCl + 1 umol of HCl", &expected));
+    let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
+const DATABASE: &str = "SOLUTION_SPECIES
+H+ = H+
+	-gamma 9 0
+H2O = H2O
+Al+3 = Al+3
+	-gamma 9 0
+SO4-2 = SO4-2
+H2O = OH- + H+
+	-log_k -14; -delta_h 13.362 kcal
+Al+3 + 4 H2O = Al(OH)4- + 4 H+
+	-log_k -22.7; -delta_h 42.3 kcal
+Al+3 + SO4-2 = AlSO4+
+	-log_k 3.5
+Fe+2 = Fe+3 + e-
+	-log_k -13.02
+PHASES
+Gibbsite
+	Al(OH)3 + 3 H+ = Al+3 + 3 H2O
+	-log_k 8.11; -delta_h -22.8 kcal
+	-Vm 32.22
+";
+
+#[test]
+fn a_database_becomes_a_module_that_runs() {
+    let dir = folder("database");
+    write(&dir, "small.dat", DATABASE);
+    let imported = matterixc_in(&dir, &["import", "phreeqc", "small.dat", "--phases", "Gibbsite", "-o", "small.mtx"]);
+    assert_eq!(imported.code, 0, "{}", imported.err);
+    assert!(imported.err.contains("its reaction has electrons: Fe+3 (line 14)"), "{}", imported.err);
+    assert_eq!(matterixc_in(&dir, &["fmt", "--check", "small.mtx"]).code, 0);
+    let expect = "    expect cup.contents.amount[Gibbsite(s)] in 0.9 mmol .. 1 mmol
+    expect acidity(cup.contents) in 6 .. 8\n";
+    let holding = "100 g of water + 1 mmol of Al3+ + 3 mmol of Cl- + 3 mmol of NaOH";
+    write(&dir, "cup.mtx", cup("use small", holding, expect));
+    let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    // Without the phase nothing precipitates.
+    let plain = matterixc_in(&dir, &["import", "phreeqc", "small.dat"]);
+    assert!(plain.code == 0 && !plain.out.contains("(s)") && plain.err.contains("Gibbsite (line 17)"), "{}", plain.err);
+}
+
+#[test]
+fn a_database_that_cannot_be_read_leaves_nothing_behind() {
+    let dir = folder("no_database");
+    let wrong = [
+        ("SOLUTION_SPECIES\nH+ = H+\n\t-log_k\n", vec![], "wrong.dat:3: `-log_k` lacks a number"),
+        ("hello\n", vec![], "no database of PHREEQC"),
+        (DATABASE, vec!["--phases", "Quartz"], "it has no phase `Quartz`"),
+        (DATABASE, vec!["--elements", "Xe"], "it has no element `Xe`"),
+    ];
+    for (text, more, why) in wrong {
+        write(&dir, "wrong.dat", text);
+        let mut args = vec!["import", "phreeqc", "wrong.dat", "-o", "out.mtx"];
+        args.extend(more);
+        let ended = matterixc_in(&dir, &args);
+        assert!(ended.code == 1 && flat(&ended.err).contains(why), "{}", ended.err);
+        assert!(!dir.join("out.mtx").exists());
+    }
+    assert_eq!(matterixc_in(&dir, &["import", "phreeqc", "absent.dat"]).code, 2);
+    assert_eq!(matterixc_in(&dir, &["import", "gems", "wrong.dat"]).code, 2);
 }

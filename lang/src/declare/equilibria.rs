@@ -108,6 +108,14 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
             )
             .because(first.key.span, "the first one"),
         ),
+        (Some(first), None) if first.key.text == ANALYTIC => {
+            for second in ["at", "enthalpy"].iter().filter_map(|key| field(fields, key)) {
+                let headline = format!("`{name}` has a constant at every temperature");
+                let label = format!("`{}` follows from `analytic`", second.key.text);
+                let d = Diagnostic::error(codes::UNKNOWN_FIELD, second.key.span, headline, label);
+                diagnostics.push(d.because(first.key.span, "given here").help("leave it out"));
+            }
+        }
         _ => {}
     }
 }
