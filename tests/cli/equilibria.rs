@@ -105,7 +105,7 @@ fn a_database_becomes_a_module_that_runs() {
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
     // Without the phase nothing precipitates.
     let plain = matterixc_in(&dir, &["import", "phreeqc", "small.dat"]);
-    assert!(plain.code == 0 && !plain.out.contains("(s)") && plain.err.contains("Gibbsite (line 17)"), "{}", plain.err);
+    assert!(plain.code == 0 && !plain.out.contains("(s)") && plain.err.contains("Gibbsite (line 18)"), "{}", plain.err);
 }
 
 #[test]
