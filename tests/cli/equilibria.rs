@@ -50,7 +50,11 @@ fn an_analytic_constant_moves_with_temperature() {
     let water = "equilibrium w: water <-> H+ + OH- {
     analytic: [293.29227, 0.1360833, -10576.913, -123.73158, 0, -6.996455e-5]\n}";
     let dir = folder("warm");
-    write(&dir, "cup.mtx", cup(water, "100 g of water at 60 degC", "    expect acidity(cup.contents) in 6.50 .. 6.52\n"));
+    write(
+        &dir,
+        "cup.mtx",
+        cup(water, "100 g of water at 60 degC", "    expect acidity(cup.contents) in 6.50 .. 6.52\n"),
+    );
     let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
 }
@@ -65,6 +69,38 @@ fn ions_have_the_coefficients_of_their_size() {
     write(&dir, "cup.mtx", cup(WATER, "1 g of water + 0.1 mmol of NaCl + 1 umol of HCl", &expected));
     let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn a_ph_that_the_equilibria_do_not_give_is_warned_of() {
+    let dir = folder("cautions");
+    let all = "use std::equilibria";
+    let acid = "equilibrium acid: acetic_acid <-> H+ + acetate { pka: 4.756 }";
+    let salty = "100 g of water + 10 mmol of acetic_acid + 120 mmol of NaCl";
+    let cases = [
+        (all, "100 g of water + 10 mmol of acetic_acid + 10 mmol of NaCl", ""),
+        (all, salty, "an ionic strength of 1.20 mol/kg"),
+        (all, "100 g of water + 10 mmol of formic_acid", "leaves out what formic_acid does"),
+        (acid, "100 g of water + 10 mmol of acetic_acid", "leaves out that water splits"),
+        (WATER, "100 g of water at 60 degC", "stands ready at 60 degC"),
+    ];
+    for (equilibria, holding, why) in cases {
+        write(&dir, "cup.mtx", cup(equilibria, holding, "    expect acidity(cup.contents) < 13\n"));
+        let checked = matterixc_in(&dir, &["check", "cup.mtx"]);
+        let said = flat(&checked.out);
+        assert!(said.contains(why) && said.contains("no findings") == why.is_empty(), "{holding}: {said}");
+    }
+}
+
+#[test]
+fn what_is_known_of_a_mixture_stays_known_where_it_cools() {
+    let dir = folder("cooling");
+    write(&dir, "cup.mtx", cup("use std::equilibria", "100 g of water + 10 mmol of acetic_acid at 60 degC", ""));
+    let checked = matterixc_in(&dir, &["check", "cup.mtx", "--contents", "--format", "json"]);
+    assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
+    let plain = matterixc_in(&dir, &["check", "cup.mtx", "--contents"]);
+    let after = plain.out.split("wait 1 s").nth(1).expect("the step").to_owned();
+    assert!(after.contains("mass 100.6 g") && !after.contains("not known"), "{}", plain.out);
 }
 
 const DATABASE: &str = "SOLUTION_SPECIES

@@ -508,11 +508,10 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// Whether all equilibria of a mixture have constants at its temperature.
-    pub fn equilibria_hold(&mut self, id: InstanceId) -> NodeId {
+    /// Whether all equilibria of a mixture have constants at a temperature.
+    pub fn equilibria_hold(&mut self, id: InstanceId, temperature: NodeId) -> NodeId {
         let mut holds = self.graph.number(1.0);
         let Some(speciation) = self.speciation(id) else { return holds };
-        let Some(temperature) = self.settled(id, |_| Some(Part::Temperature)) else { return holds };
         for e in speciation.equilibria.iter().copied() {
             let Some((low, high)) = self.window_of(e) else { continue };
             let above = self.graph.binary(BinaryOp::Le, low, temperature);

@@ -83,7 +83,7 @@ enum Bound {
     Settled,
     /// The ionic strength that equilibria leave.
     IonicStrength,
-    /// Whether equilibria have constants at the temperature that is there.
+    /// Whether equilibria have constants at a temperature.
     EquilibriaHold,
     /// The heat of coming to equilibrium at the start.
     HeatAtStart,
@@ -278,7 +278,7 @@ impl Elaborator<'_> {
                 let node = self.settled(*m, |_| Some(Part::Strength)).unwrap_or(otherwise.node);
                 Value::Num(Num { node, literal: false, ..otherwise.clone() })
             }
-            (Bound::EquilibriaHold, [Value::Instance(m)]) => Value::Bool(self.equilibria_hold(*m)),
+            (Bound::EquilibriaHold, [Value::Instance(m), Value::Num(t)]) => Value::Bool(self.equilibria_hold(*m, t.node)),
             (Bound::HeatAtStart, [Value::Instance(m), Value::Num(t)]) => {
                 let node = self.heat_at_start(*m, t.node);
                 let node = node.unwrap_or_else(|| self.graph.number(0.0));

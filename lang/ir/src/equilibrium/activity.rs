@@ -76,7 +76,13 @@ impl Coefficients {
     }
 
     /// How the logarithm grows with one of the numbers of [`Activities`].
-    pub(super) fn by_common(&self, all: &Activities, charge: f64, (strength, temperature): (f64, f64), which: usize) -> f64 {
+    pub(super) fn by_common(
+        &self,
+        all: &Activities,
+        charge: f64,
+        (strength, temperature): (f64, f64),
+        which: usize,
+    ) -> f64 {
         let strength = all.strength(strength);
         let root = strength.sqrt();
         let ([a, b], _) = all.at(temperature);
@@ -88,7 +94,13 @@ impl Coefficients {
     }
 
     /// How the logarithm grows with one of its own numbers.
-    pub(super) fn by_own(&self, all: &Activities, charge: f64, (strength, temperature): (f64, f64), which: usize) -> f64 {
+    pub(super) fn by_own(
+        &self,
+        all: &Activities,
+        charge: f64,
+        (strength, temperature): (f64, f64),
+        which: usize,
+    ) -> f64 {
         let strength = all.strength(strength);
         let ([a, b], _) = all.at(temperature);
         let over = 1.0 + (self.plain + b * self.size) * strength.sqrt();

@@ -9,9 +9,9 @@
 
 use std::sync::Arc;
 
+use super::activity::{Activities, Coefficient, Coefficients};
 use super::basis::Basis;
 use super::linear::{Factors, Matrix};
-use super::activity::{Activities, Coefficient, Coefficients};
 use super::{Layout, Member, Phase, System, memo};
 use crate::math;
 

@@ -275,12 +275,54 @@ fn lead() -> Sketch {
 
 #[test]
 fn ions_of_several_atoms_are_solved() {
-    let mixture =
-        lead().build().with(&[("water", WATER), ("Pb++", 9.317e-5), ("Cl-", 1.71274e-3), ("Ca++", 7.632e-4)]);
+    let mixture = lead().build().with(&[("water", WATER), ("Pb++", 9.317e-5), ("Cl-", 1.71274e-3), ("Ca++", 7.632e-4)]);
     assert!((mixture.ph() - 6.0).abs() < 0.5, "{}", mixture.ph());
     for seed in 0..300_u32 {
         let of = |k: u32| 10f64.powf(-7.0 + 6.0 * f64::from((seed * 37 + k * 101) % 113) / 113.0);
         let all = [("water", WATER), ("Pb++", of(1)), ("Cl-", of(2)), ("OH-", of(3)), ("H+", of(4))];
         assert!(lead().build().real().with(&all).ph().is_finite(), "{seed}");
     }
+}
+
+#[test]
+fn bounds_hold_what_is_drawn_within_them() {
+    let layout = acids().build().system.layout();
+    let mut narrow = 0;
+    for seed in (0..240_u64).step_by(3) {
+        let mixture = random(seed);
+        let heat = layout.heat();
+        let capacity = mixture.args[layout.capacity()];
+        // The heat is known within 10 K, and in every other mixture the amounts within 1 % too.
+        let by_heat = |i: usize| (mixture.args[i] - 5.0 * capacity, mixture.args[i] + 5.0 * capacity);
+        let is_amount = |i: usize| i >= layout.amount(0) && i < layout.bystanders() && seed % 2 == 1;
+        let args: Vec<(f64, f64)> = (0..layout.count())
+            .map(|i| match i {
+                i if i == heat => by_heat(i),
+                i if is_amount(i) => (mixture.args[i] * 0.99, mixture.args[i] * 1.01),
+                i => (mixture.args[i], mixture.args[i]),
+            })
+            .collect();
+        let count = mixture.system.members().len() as u32;
+        let mut parts: Vec<Part> = (0..count).map(Part::Amount).collect();
+        parts.extend([Part::Temperature, Part::Strength, Part::Heat, Part::Capacity, Part::Activity(1)]);
+        for part in parts {
+            let (low, high) = mixture.system.bounds(part, &args);
+            narrow += u32::from((high - low).is_finite());
+            for draw in 0..12_u64 {
+                let share = |i: usize| ((draw * 7 + i as u64 * 5) % 11) as f64 / 10.0;
+                let at: Vec<f64> = args
+                    .iter()
+                    .enumerate()
+                    .map(|(i, a)| if a.0 == a.1 { a.0 } else { a.0 + share(i) * (a.1 - a.0) })
+                    .collect();
+                let value = mixture.system.value(part, &at);
+                let slack = 1e-9 * value.abs() + 1e-18;
+                assert!(
+                    value.is_nan() || low - slack <= value && value <= high + slack,
+                    "mixture {seed}, {part:?}: {value:e} is not in {low:e} .. {high:e}"
+                );
+            }
+        }
+    }
+    assert!(narrow > 500, "{narrow}");
 }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::equilibrium::Call;
+use matterix_ir::equilibrium::{Call, Part};
 use matterix_ir::graph::{binary, unary};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::values::{Formulas, Rules};
@@ -143,7 +143,11 @@ impl<M: Fn(u32) -> bool> Rules for Look<'_, M> {
     fn solved(&self, call: &Call, args: &[(f64, bool)]) -> Option<(f64, bool)> {
         let numbers: Vec<f64> = args.iter().map(|a| a.0).collect();
         let value = call.system.value(call.part, &numbers);
-        Some((value, !value.is_nan() && args.iter().all(|a| a.1)))
+        // How warm it is moves with time; what is dissolved follows it little, and stands as in what steps leave.
+        let heat = call.system.layout().heat();
+        let counts = |i: usize| i != heat || call.part == Part::Temperature;
+        let is_known = args.iter().enumerate().all(|(i, arg)| arg.1 || !counts(i));
+        Some((value, is_known && !value.is_nan()))
     }
 
     fn either(&self, condition: (f64, bool), a: (f64, bool), b: (f64, bool)) -> Option<(f64, bool)> {
