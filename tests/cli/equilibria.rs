@@ -100,7 +100,7 @@ fn what_is_known_of_a_mixture_stays_known_where_it_cools() {
     assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
     let plain = matterixc_in(&dir, &["check", "cup.mtx", "--contents"]);
     let after = plain.out.split("wait 1 s").nth(1).expect("the step").to_owned();
-    assert!(after.contains("mass 100.6 g") && !after.contains("not known"), "{}", plain.out);
+    assert!(after.contains("volume 100.8 .. 100.9 mL") && !after.contains("not known"), "{}", plain.out);
 }
 
 const DATABASE: &str = "SOLUTION_SPECIES
