@@ -154,11 +154,16 @@ impl World {
                 }
                 body.set_angvel(spin, false);
                 let force = DRIVEN.0 * (goal - at) + DRIVEN.1 * (speed - going);
-                let mut force = force.clamp(-grip.force, grip.force);
-                if going.abs() > grip.speed {
-                    // It goes no faster, whatever gives way.
-                    force = -going.signum() * (going.abs() - grip.speed) * body.mass() / STEP;
-                }
+                let force = force.clamp(-grip.force, grip.force);
+                // It goes no faster, whatever gives way; to brake, it may press with more than that takes.
+                let slows = |limit: f64| (limit - going) * body.mass() / STEP;
+                let force = if going > grip.speed {
+                    force.min(slows(grip.speed))
+                } else if going < -grip.speed {
+                    force.max(slows(-grip.speed))
+                } else {
+                    force
+                };
                 let axis = *body.rotation() * Vector::from(finger.axis);
                 body.reset_forces(false);
                 body.add_force(axis * force, false);
