@@ -60,7 +60,7 @@ impl<'p> Matter<'p> {
             fixtures,
             event: None,
             moments: Vec::new(),
-            strays: Vec::new(),
+            sightings: Vec::new(),
             unknown,
             shown: 0,
         };
