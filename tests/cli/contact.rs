@@ -190,10 +190,34 @@ fn check_takes_nothing_for_held_that_a_failed_motion_may_have_lost() {
     assert!(ended.out.contains("[not-in-hand]: `put back vial by panda` cannot be done"), "{}", ended.out);
 }
 
+/// An environment with its things near by, and not quite where they are taken to be.
+fn environment(name: &str, seed: u32) -> Ended {
+    let (file, seed) = (format!("examples/environments/{name}.mtx"), seed.to_string());
+    let off = ["--perturb", "20mm,10deg", "--unseen", "2mm,1deg", "--seed", &seed];
+    let mut args = vec!["run", &file, "--fidelity", "contact"];
+    args.extend(off);
+    matterixc(&args)
+}
+
 #[test]
-fn a_plate_is_carried_onto_a_deck_by_force_and_friction() {
-    let ended = matterixc(&["run", "examples/environments/plate_into_ot2.mtx", "--fidelity", "contact"]);
-    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+fn a_plate_is_carried_onto_a_deck_by_force_and_friction_from_places_near_by() {
+    for seed in 1..=3 {
+        let ended = environment("plate_into_ot2", seed);
+        assert_eq!(ended.code, 0, "{seed}: {}{}", ended.out, ended.err);
+    }
+}
+
+#[test]
+fn a_vial_that_does_not_come_into_its_hole_is_said_to_be_stopped_or_to_fall() {
+    // The hole leaves it 0.5 mm on either side, and both are up to 2 mm off.
+    let ended: Vec<Ended> = (1..=3).map(|seed| environment("vial_insertion", seed)).collect();
+    let failed: Vec<String> = ended.iter().filter(|e| e.code != 0).map(|e| flat(&e.err)).collect();
+    assert!(!failed.is_empty());
+    for said in failed {
+        let jammed = said.contains("failed with `jammed`: `vial` is stopped by `rack` at (");
+        let toppled = said.contains("failed with `toppled`: `vial` leans by");
+        assert!((jammed || toppled) && said.contains("line 17") || said.contains("vial_insertion.mtx:17"), "{said}");
+    }
 }
 
 #[test]
