@@ -12,7 +12,7 @@ use super::{Interpreter, Raised};
 
 /// What a motion fails with after which a hand is empty.
 const LOST: &str = "dropped";
-/// What a motion fails with after which only a run can tell whether a hand still holds what it held.
+/// What a motion fails with after which a hand still holds what it held, or does not.
 const MAY_LOSE: [&str; 5] = ["collision", "jammed", "missed", "slip", "toppled"];
 /// The value of a state that points at nothing.
 const NOTHING: f64 = -1.0;
@@ -53,7 +53,7 @@ impl Interpreter<'_, '_> {
             .collect();
         let held = |known: &AbstractValue| match name == LOST {
             true => AbstractValue::Point(NOTHING),
-            false => known.join(&AbstractValue::Point(NOTHING), Imprecision::Unknown),
+            false => known.join(&AbstractValue::Point(NOTHING), Imprecision::Paths),
         };
         let hands: Vec<(u32, AbstractValue)> =
             hands.into_iter().map(|index| (index as u32, held(&facts.states[index]))).collect();
