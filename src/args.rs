@@ -200,18 +200,9 @@ pub struct RunArgs {
     /// Write the tables as CSV too, one column a quantity.
     #[arg(long, requires = "out")]
     pub csv: bool,
-    /// How closely motions are simulated; with `motion` and `contact` they are looked at before the run begins.
-    #[arg(long, value_enum, default_value_t = RunFidelity::Process)]
-    pub fidelity: RunFidelity,
-    /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
-    #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
-    pub perturb: Option<Perturbation>,
-    /// Let the same things really be so far from where robots take them to be: `--unseen 2mm,1deg`, with `--fidelity motion` or `contact`.
-    #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
-    pub unseen: Option<Perturbation>,
-    /// Let friction and the force of grips really be such a share of what is said: `--really friction=0.2,grip=0.5`, with `--fidelity contact`.
-    #[arg(long, value_name = "WHAT=SHARE[,..]", value_parser = really)]
-    pub really: Option<Really>,
+    /// How closely it is simulated.
+    #[command(flatten)]
+    pub reality: Reality,
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
@@ -224,6 +215,23 @@ pub struct RunArgs {
     /// Let claims take turns as in a schedule: one made before the run, or one that `plan --format json` has written.
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     pub plan: Option<Option<PathBuf>>,
+}
+
+/// How closely motions are simulated, and how the lab really is.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Reality {
+    /// How closely motions are simulated; with `motion` and `contact` they are looked at before the run begins.
+    #[arg(long, value_enum, default_value_t = RunFidelity::Process)]
+    pub fidelity: RunFidelity,
+    /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
+    #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
+    pub perturb: Option<Perturbation>,
+    /// Let the same things really be so far from where robots take them to be: `--unseen 2mm,1deg`, with `--fidelity motion` or `contact`.
+    #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
+    pub unseen: Option<Perturbation>,
+    /// Let friction and the force of grips really be such a share of what is said: `--really friction=0.2,grip=0.5`, with `--fidelity contact`.
+    #[arg(long, value_name = "WHAT=SHARE[,..]", value_parser = really)]
+    pub really: Option<Really>,
 }
 
 /// `matterixc plan`.
@@ -291,6 +299,9 @@ pub struct TestArgs {
     /// Where all randomness of each run starts.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
+    /// How closely they are simulated.
+    #[command(flatten)]
+    pub reality: Reality,
     /// Form of the results.
     #[arg(long, value_enum, default_value_t = TestFormat::Human)]
     pub format: TestFormat,
@@ -693,7 +704,7 @@ fn measure(text: &str, units: &Units) -> Result<Option<f64>, String> {
 }
 
 /// A length, an angle, or both.
-fn perturbation(text: &str) -> Result<Perturbation, String> {
+pub fn perturbation(text: &str) -> Result<Perturbation, String> {
     let wrong = || "write a length, an angle, or both, as in \"20mm,10deg\"".to_string();
     let (mut shift, mut turn) = (None, None);
     for part in text.split(',').map(str::trim) {
@@ -712,7 +723,7 @@ fn perturbation(text: &str) -> Result<Perturbation, String> {
 }
 
 /// Shares of friction and of the force of grips.
-fn really(text: &str) -> Result<Really, String> {
+pub fn really(text: &str) -> Result<Really, String> {
     let wrong = || "write shares from 0 to 10, as in \"friction=0.2,grip=0.5\"".to_string();
     let mut really = Really::default();
     for part in text.split(',') {

@@ -9,6 +9,16 @@ const LONGEST: u64 = 300;
 /// How often a run is looked at, ms.
 const PAUSE: u64 = 20;
 
+/// How environments are run, beside their seed.
+pub type How = [&'static str];
+
+/// Motions among things that stand a little away from their places.
+pub const MOTION: &How = &["--fidelity", "motion", "--perturb", "20mm,10deg"];
+/// The same with what grips bear, and things that are not quite where they are taken to be.
+pub const CONTACT: &How = &["--fidelity", "contact", "--perturb", "20mm,10deg", "--unseen", "2mm,1deg"];
+/// What goes into a hole that is not quite where it is taken to be.
+pub const PEG: &How = &["--fidelity", "contact", "--unseen", "1mm,2deg"];
+
 /// What became of a run.
 #[derive(Clone, Debug)]
 pub struct Trial {
@@ -18,6 +28,8 @@ pub struct Trial {
     pub seconds: f64,
     /// The code of its first error, if it ended in one; a failure of the run by its own name.
     pub fault: Option<String>,
+    /// What that error says.
+    pub why: Option<String>,
     /// Whether there was a recording to judge: one that never began has none.
     pub judged: bool,
     /// What the judge found wrong.
@@ -26,10 +38,11 @@ pub struct Trial {
 
 /// Runs a file from one lab and judges what was recorded.
 #[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
-pub fn trial(file: &Path, seed: u32) -> Trial {
+pub fn trial(file: &Path, how: &How, seed: u32) -> Trial {
     let start = Instant::now();
     let out = folder(file, seed);
-    let fault = run(file, seed, &out, start);
+    let said = run(file, how, seed, &out, start);
+    let (fault, why) = said.map(|said| (code(&said), said)).unzip();
     let seconds = start.elapsed().as_secs_f64();
     let recording = std::fs::read(out.join("recording.mcap")).ok();
     let wrong = match recording.as_deref().map(matterix_judge::judge) {
@@ -39,7 +52,7 @@ pub fn trial(file: &Path, seed: u32) -> Trial {
     };
     // What is left behind is only in the way.
     let _ = std::fs::remove_dir_all(&out);
-    Trial { seed, seconds, fault, judged: recording.is_some(), wrong }
+    Trial { seed, seconds, fault, why, judged: recording.is_some(), wrong }
 }
 
 /// A folder of its own for every run.
@@ -48,8 +61,8 @@ fn folder(file: &Path, seed: u32) -> PathBuf {
     std::env::temp_dir().join(format!("matterix-environments-{}", std::process::id())).join(format!("{stem}-{seed}"))
 }
 
-/// Why a run failed, if it did.
-fn run(file: &Path, seed: u32, out: &Path, start: Instant) -> Option<String> {
+/// Why a run failed, if it did: the headline of its first error.
+fn run(file: &Path, how: &How, seed: u32, out: &Path, start: Instant) -> Option<String> {
     let binary = std::env::var_os("MATTERIX_BIN").unwrap_or_else(|| env!("CARGO_BIN_EXE_matterixc").into());
     if let Err(why) = std::fs::create_dir_all(out) {
         return Some(why.to_string());
@@ -60,7 +73,7 @@ fn run(file: &Path, seed: u32, out: &Path, start: Instant) -> Option<String> {
         Err(why) => return Some(why.to_string()),
     };
     let mut command = Command::new(&binary);
-    command.arg("run").arg(file).args(["--fidelity", "motion", "--perturb", "20mm,10deg"]);
+    command.arg("run").arg(file).args(how);
     command.args(["--seed", &seed.to_string(), "--no-cache", "--out"]).arg(out);
     let spawned = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr).spawn();
     let mut child = match spawned {
@@ -81,8 +94,10 @@ fn run(file: &Path, seed: u32, out: &Path, start: Instant) -> Option<String> {
         }
     }
     let text = std::fs::read_to_string(&errors).unwrap_or_default();
-    let first = text.lines().find(|l| l.starts_with("error")).unwrap_or("ended without an error");
-    Some(code(first))
+    let lines = text.lines().skip_while(|l| !l.starts_with("error"));
+    let headline: Vec<&str> =
+        lines.map(str::trim).take_while(|l| !l.is_empty() && !l.starts_with(['╭', '['])).collect();
+    Some(if headline.is_empty() { "ended without an error".to_string() } else { headline.join(" ") })
 }
 
 /// The failure of a run, or else the code of an error, or else all of its line.

@@ -5,10 +5,9 @@ use std::sync::atomic::AtomicBool;
 
 use matterix_ir::{Diagnostic, Program};
 use matterix_runtime::exec::Turn;
-use matterix_runtime::motion::{Unseen, perturb};
 use matterix_runtime::record::Folder;
 
-use crate::args::{Color, RunArgs, RunFidelity, RunFormat};
+use crate::args::{Color, RunArgs, RunFormat};
 use crate::cache;
 use crate::pipeline::{self, Choices, Input, Keep, Search};
 use crate::progress::{Kind, Progress};
@@ -23,12 +22,8 @@ pub fn run(args: &RunArgs, color: Color) -> Exit {
 
 /// The run; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
-    if args.unseen.is_some() && (args.fidelity == RunFidelity::Process || args.dry) {
-        return Err("`--unseen` is of robots that move: it needs `--fidelity motion` or `contact`".to_string());
-    }
-    if args.really.is_some() && (args.fidelity != RunFidelity::Contact || args.dry) {
-        return Err("`--really` is of what holds by force and friction: it needs `--fidelity contact`".to_string());
-    }
+    let reality = &args.reality;
+    reality.agrees(args.dry)?;
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     if let Some(dir) = &args.out {
         is_writable(dir)?;
@@ -41,16 +36,8 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         findings.end();
         return Ok(Exit::Findings);
     };
-    let moved = match args.perturb {
-        Some(by) => perturb(&mut program, by, args.seed)?,
-        None => Vec::new(),
-    };
-    let unseen = match args.unseen {
-        Some(by) => Unseen::drawn(&program, by, args.seed)?,
-        None => Unseen::default(),
-    };
-
-    let found = match args.fidelity != RunFidelity::Process && !args.dry {
+    let drawn = reality.draw(&mut program, args.seed)?;
+    let found = match reality.moves() && !args.dry {
         true => pipeline::motions(&program, &*cache::of(args.no_cache)),
         false => pipeline::standing(&program),
     };
@@ -71,8 +58,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     };
     let mut progress = Progress::new(&program.plan, kind(args.format));
     let keep = if args.out.is_some() { Keep::Curves } else { Keep::Ends };
-    let (fidelity, really) = (args.fidelity, args.really.unwrap_or_default());
-    let choices = Choices { seed: args.seed, fidelity, dry: args.dry, turns, moved, unseen, really, keep };
+    let choices = Choices { dry: args.dry, turns, keep, ..drawn };
     let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
     progress.finish();
 

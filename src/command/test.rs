@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use matterix_ir::{Diagnostic, Sources};
 use serde_json::{Value, json};
 
-use crate::args::{Color, RunFidelity, TestArgs, TestFormat};
-use crate::pipeline::{self, Choices, Input, Test};
+use crate::args::{Color, Reality, TestArgs, TestFormat};
+use crate::cache;
+use crate::pipeline::{self, Input, Test};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Look, Reporter};
 use crate::terminal::{self, Stream, paint, print, print_error};
@@ -15,7 +16,7 @@ use crate::{Exit, cancel, files};
 
 /// Runs every test of the files, a line each, and counts them; what failed is shown below its line.
 pub fn test(args: &TestArgs, color: Color) -> Exit {
-    let cancel = match cancel::on_interrupt() {
+    let cancel = match args.reality.agrees(false).and_then(|()| cancel::on_interrupt()) {
         Ok(cancel) => cancel,
         Err(message) => {
             print_error(&message);
@@ -27,6 +28,7 @@ pub fn test(args: &TestArgs, color: Color) -> Exit {
         format: args.format,
         look: terminal::look(Stream::Out, color),
         seed: args.seed,
+        reality: args.reality,
         cancel,
         passed: 0,
         failed: 0,
@@ -59,6 +61,7 @@ struct Trial {
     format: TestFormat,
     look: Look,
     seed: u64,
+    reality: Reality,
     /// Set when the user has had enough.
     cancel: &'static AtomicBool,
     passed: usize,
@@ -86,23 +89,31 @@ impl Trial {
             if self.cancel.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            self.run(&input.name, &sources, &test, broken);
+            self.run(&input.name, &sources, &test, broken)?;
         }
         Ok(())
     }
 
-    fn run(&mut self, file: &str, sources: &Sources, test: &Test, broken: bool) {
-        let Some(program) = test.program.as_ref().filter(|_| !broken) else {
+    fn run(&mut self, file: &str, sources: &Sources, test: &Test, broken: bool) -> Result<(), String> {
+        let Some(mut program) = test.program.clone().filter(|_| !broken) else {
             // What is wrong with the file has been shown; the rest may follow from it.
             let found = if broken { Vec::new() } else { test.diagnostics.clone() };
-            return self.tell(file, sources, test, None, found);
+            self.tell(file, sources, test, None, found);
+            return Ok(());
         };
+        let choices = self.reality.draw(&mut program, self.seed)?;
+        let found = self.reality.look(&program, &*cache::of(false));
+        if found.iter().any(Diagnostic::is_error) {
+            self.tell(file, sources, test, None, found);
+            return Ok(());
+        }
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
-        let choices = Choices::plain(self.seed, RunFidelity::Process);
-        let ran = pipeline::run(program, sources, &choices, self.cancel, &mut progress);
+        let ran = pipeline::run(&program, sources, &choices, self.cancel, &mut progress);
         progress.finish();
-        let found = if ran.passed { test.diagnostics.clone() } else { ran.diagnostics.clone() };
+        let own = if ran.passed { &test.diagnostics } else { &ran.diagnostics };
+        let found = found.into_iter().chain(own.iter().cloned()).collect();
         self.tell(file, sources, test, Some((ran.passed, ran.end_time())), found);
+        Ok(())
     }
 
     /// Counts a test and shows it: whether it passed, with the lab time at its end, and what was found.

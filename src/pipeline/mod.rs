@@ -10,6 +10,7 @@ mod many;
 mod mend;
 mod neighbours;
 mod plan;
+mod reality;
 mod run;
 #[cfg(feature = "sila")]
 mod serve;

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use matterix_ir::plan::{Condition, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
-use matterix_runtime::contact::{Really, Stray};
+use matterix_runtime::contact::{Really, Sighting};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
@@ -196,8 +196,8 @@ impl Listener for Follower<'_, '_> {
         self.recording.travels(moments);
     }
 
-    fn strays(&mut self, strays: &[Stray]) {
-        self.recording.strays(strays);
+    fn sightings(&mut self, sightings: &[Sighting]) {
+        self.recording.sightings(sightings);
     }
 
     fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {

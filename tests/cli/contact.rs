@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::harness::{Ended, flat, folder, matterixc, matterixc_in, write};
+use crate::harness::{Ended, flat, folder, matterixc, matterixc_in, root, write};
 
 /// A beaker with so much water and a vial on a table, an arm whose fingers press with so much, and what it does.
 fn bench(force: &str, water: &str, lines: &str) -> String {
@@ -85,6 +85,139 @@ fn fingers_that_close_beside_a_thing_miss_it() {
         said.iter().any(|said| said.contains("failed with `missed`: the fingers of `panda` press on `vial`")),
         "{said:#?}"
     );
+}
+
+#[test]
+fn what_does_not_meet_its_hole_jams_and_a_handler_goes_on() {
+    // 0.5 mm on either side.
+    let file = root().join("examples/environments/vial_insertion.mtx");
+    let text = std::fs::read_to_string(file).expect("the example");
+    let dir = folder("contact_jammed");
+    write(&dir, "bench.mtx", &text);
+    let off = ["--unseen", "1mm", "--seed", "3"];
+    let ended = run(&dir, &off);
+    let said = flat(&ended.err);
+    assert_eq!(ended.code, 1, "{said}");
+    assert!(said.contains("failed with `jammed`: `vial` is stopped by `rack` at ("), "{said}");
+    assert!(said.contains("presses on it with") && said.contains("slide arm to hole.place"), "{said}");
+    let handled = text.replace(
+        "insert vial into rack[B3] by panda\n",
+        "sequence { insert vial into rack[B3] by panda } on jammed { note \"it does not go in\" }\n",
+    );
+    write(
+        &dir,
+        "bench.mtx",
+        handled.replace("    expect vial.support == rack[B3]\n", "    expect panda.holding == nothing\n"),
+    );
+    let ended = run(&dir, &off);
+    assert!(ended.code == 0 && ended.out.contains("it does not go in"), "{}{}", ended.out, ended.err);
+}
+
+/// A peg that is gripped at its end, a vial, and a post of 12 mm to stand on.
+fn post(name: &str, lines: &str) -> PathBuf {
+    let dir = folder(name);
+    let text = format!(
+        "mtx 1\n\nuse std::robots::{{FrankaHand, FrankaPanda}}\nuse std::vials::Vial8mL\n\n\
+         asset Post: Labware, Surface {{\n    mass: 2 kg\n    friction: 0.5\n    shape: box(12 mm, 12 mm, 60 mm)\n    \
+         frame grasp at (0, 0, 50) mm\n}}\n\nasset Peg: Graspable {{\n    mass: 50 g\n    friction: 0.5\n    \
+         shape: cylinder(17 mm, 60 mm)\n    frame grasp at (0, 0, 60) mm\n}}\n\nlab bench {{\n    ambient: 22 degC\n    \
+         table = OpticalTable\n    panda = FrankaPanda {{ gripper: FrankaHand {{}} }} on table at (0, 0) mm\n    \
+         post = Post on table at (450, -150) mm\n    vial = Vial8mL on table at (450, 150) mm\n    \
+         peg = Peg on table at (450, 0) mm\n}}\n\nworkflow run in bench {{\n    {lines}\n}}\n"
+    );
+    write(&dir, "bench.mtx", text);
+    dir
+}
+
+#[test]
+fn what_leaves_the_fingers_is_dropped_and_handlers_take_it() {
+    // 9 mm of it are between the fingers.
+    let (lines, slippery) = ("pick peg by panda\n    put back peg by panda", ["--really", "friction=0.001"]);
+    let dir = post("contact_dropped", lines);
+    let held = run(&dir, &[]);
+    assert_eq!(held.code, 0, "{}", held.err);
+    let said = flat(&run(&dir, &slippery).err);
+    let parts = [
+        "failed with `dropped`: `panda` drops `peg`",
+        "neither finger touches it any more",
+        "slide arm to item.post_grasp",
+    ];
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+    let lines = format!("sequence {{ {lines} }} on dropped {{ note \"gone\" }}\n    expect panda.holding == nothing");
+    let dir = post("contact_dropped_handled", &lines);
+    let ended = run(&dir, &slippery);
+    assert!(ended.code == 0 && ended.out.contains("gone"), "{}{}", ended.out, ended.err);
+}
+
+#[test]
+fn what_is_put_down_beside_its_place_topples_and_handlers_take_it() {
+    let lines = "place vial on post by panda";
+    let dir = post("contact_toppled", lines);
+    let stands = run(&dir, &[]);
+    assert_eq!(stands.code, 0, "{}", stands.err);
+    // Its middle is beyond the post from 6 mm on.
+    let from = |dir: &Path, seed: usize| run(dir, &["--unseen", "9mm", "--seed", &seed.to_string()]);
+    let topples =
+        |said: &str| said.contains("failed with `toppled`: `vial` leans by") && said.contains("release item on");
+    let seed = (1..=12).find(|seed| topples(&flat(&from(&dir, *seed).err))).expect("one of them is too far off");
+    let lines = format!(
+        "sequence {{ {lines} }} on toppled {{ note \"it lies\" }}\n    \
+         expect panda.holding == nothing"
+    );
+    let ended = from(&post("contact_toppled_handled", &lines), seed);
+    assert!(ended.code == 0 && ended.out.contains("it lies"), "{}{}", ended.out, ended.err);
+}
+
+#[test]
+fn check_takes_nothing_for_held_that_a_failed_motion_may_have_lost() {
+    let held = "pick vial by panda\n    sequence { lift panda by 50 mm } on ";
+    let check = |name: &str, handler: &str| {
+        let dir = lab(name, "70 N", "100 mL", &format!("{held}{handler}\n    expect elapsed > 0 s"));
+        matterixc_in(&dir, &["check", "bench.mtx"])
+    };
+    // It may be gone after a slip, and is after a drop.
+    for (name, handler) in [
+        (
+            "contact_lost_slip",
+            "slip { if panda.holding == vial { put back vial by panda } else { pick vial by panda } }",
+        ),
+        ("contact_lost_drop", "dropped { pick vial by panda }"),
+    ] {
+        let ended = check(name, handler);
+        assert!(!ended.out.contains("hand-full") && !ended.out.contains("not-in-hand"), "{name}: {}", ended.out);
+    }
+    let ended = check("contact_lost_back", "dropped { put back vial by panda }");
+    assert!(ended.out.contains("[not-in-hand]: `put back vial by panda` cannot be done"), "{}", ended.out);
+}
+
+/// An environment with its things near by, and not quite where they are taken to be.
+fn environment(name: &str, seed: u32) -> Ended {
+    let (file, seed) = (format!("examples/environments/{name}.mtx"), seed.to_string());
+    let off = ["--perturb", "20mm,10deg", "--unseen", "2mm,1deg", "--seed", &seed];
+    let mut args = vec!["run", &file, "--fidelity", "contact"];
+    args.extend(off);
+    matterixc(&args)
+}
+
+#[test]
+fn a_plate_is_carried_onto_a_deck_by_force_and_friction_from_places_near_by() {
+    for seed in 1..=3 {
+        let ended = environment("plate_into_ot2", seed);
+        assert_eq!(ended.code, 0, "{seed}: {}{}", ended.out, ended.err);
+    }
+}
+
+#[test]
+fn a_vial_that_does_not_come_into_its_hole_is_said_to_be_stopped_or_to_fall() {
+    // The hole leaves it 0.5 mm on either side, and both are up to 2 mm off.
+    let ended: Vec<Ended> = (1..=3).map(|seed| environment("vial_insertion", seed)).collect();
+    let failed: Vec<String> = ended.iter().filter(|e| e.code != 0).map(|e| flat(&e.err)).collect();
+    assert!(!failed.is_empty());
+    for said in failed {
+        let jammed = said.contains("failed with `jammed`: `vial` is stopped by `rack` at (");
+        let toppled = said.contains("failed with `toppled`: `vial` leans by");
+        assert!((jammed || toppled) && said.contains("line 17") || said.contains("vial_insertion.mtx:17"), "{said}");
+    }
 }
 
 #[test]

@@ -21,6 +21,8 @@ const DRIVEN: (f64, f64) = (1e4, 60.0);
 /// What a motor and its gears add to the mass of each finger along its way, kg: as armatures of small grippers are described for simulators.
 const ARMATURE: f64 = 0.1;
 
+/// The share of its greatest speed from which on a motor gives no more than it takes to keep that.
+const NEARLY: f64 = 0.5;
 /// How far a finger may have turned from where its hand has it before it is set right, rad.
 const ASTRAY: f64 = 1e-7;
 
@@ -154,11 +156,16 @@ impl World {
                 }
                 body.set_angvel(spin, false);
                 let force = DRIVEN.0 * (goal - at) + DRIVEN.1 * (speed - going);
-                let mut force = force.clamp(-grip.force, grip.force);
-                if going.abs() > grip.speed {
-                    // It goes no faster, whatever gives way.
-                    force = -going.signum() * (going.abs() - grip.speed) * body.mass() / STEP;
-                }
+                let force = force.clamp(-grip.force, grip.force);
+                // It goes no faster, whatever gives way: near its greatest speed it only presses with what takes it there.
+                let brings_to = |speed: f64| (speed - going) * body.mass() / STEP;
+                let force = if going > NEARLY * grip.speed {
+                    force.min(brings_to(grip.speed))
+                } else if going < -NEARLY * grip.speed {
+                    force.max(brings_to(-grip.speed))
+                } else {
+                    force
+                };
                 let axis = *body.rotation() * Vector::from(finger.axis);
                 body.reset_forces(false);
                 body.add_force(axis * force, false);

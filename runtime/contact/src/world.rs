@@ -193,10 +193,14 @@ impl World {
 
     /// Where a led body is at the end of the next step.
     pub fn lead(&mut self, id: Id, to: &Pose) {
-        let to = isometry(to);
+        let mut to = isometry(to);
         if let Some(body) = self.handle(id).and_then(|handle| self.bodies.get_mut(handle))
             && *body.position() != to
         {
+            // Of the two ways to write a turn the one that is near: the other one leads once around within the step.
+            if body.position().rotation.dot(to.rotation) < 0.0 {
+                to.rotation = -to.rotation;
+            }
             body.set_next_kinematic_position(to);
         }
     }

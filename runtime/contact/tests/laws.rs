@@ -379,3 +379,36 @@ fn a_light_vial_stays_upright_between_strong_fingers() {
         assert!(lean < 0.01 && moved < 4e-4, "{lean} rad, {moved} m");
     }
 }
+
+#[test]
+fn a_turn_that_is_written_the_other_way_is_the_same_turn() {
+    let (mut world, _, item) = pinched(0.2, 70.0, 0.5);
+    let (hand, before) = (Id(0), world.pose(Id(0)).inverse().then(world.pose(item)));
+    for k in 0..500u32 {
+        let to = Pose::turned([0.0, 0.0, 0.3], [0.0, 0.0, 2e-3 * f64::from(k)]);
+        // A turn and its negative are the same one.
+        let sign = if k % 50 < 25 { 1.0 } else { -1.0 };
+        world.lead(hand, &Pose { rotation: to.rotation.map(|r| r * sign), ..to });
+        world.step();
+    }
+    let after = world.pose(hand).inverse().then(world.pose(item));
+    assert!(far(after.position, before.position) < 1e-3, "{before:?} {after:?}");
+    let [one, other] = [before, after].map(|pose| pose.point([0.1, 0.0, 0.0]));
+    assert!(far(one, other) < 2e-3, "{before:?} {after:?}");
+}
+
+#[test]
+fn fingers_that_let_go_come_to_rest_where_they_are_led() {
+    let (mut world, grip, _) = pinched(0.2, 70.0, 0.5);
+    let mut to = world.opened(grip);
+    let mut widest = 0.0f64;
+    for _ in 0..1000 {
+        let next = f64::min(to + 0.2 * STEP, 0.035);
+        world.close(grip, next, (next - to) / STEP);
+        to = next;
+        world.step();
+        widest = widest.max(world.opened(grip));
+    }
+    assert!((world.opened(grip) - 0.035).abs() < 2e-4 && widest < 0.036, "{} {widest}", world.opened(grip));
+    assert!(world.opening(grip).abs() < 1e-3, "{}", world.opening(grip));
+}

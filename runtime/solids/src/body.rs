@@ -9,7 +9,7 @@ use matterix_ir::robot::{Link, Robot, Solid};
 use matterix_ir::scene::{Shape, Solid as Placed};
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::{Pose as Isometry, Vector};
-use parry3d_f64::query;
+use parry3d_f64::query::{self, Ray};
 use parry3d_f64::shape::SharedShape;
 
 use crate::bored::{self, Piece};
@@ -141,6 +141,19 @@ impl Body {
         let around = self.pieces.iter().map(|p| p.shape.compute_aabb(&(*at * p.at))).reduce(|a, b| a.merged(&b));
         let around = around.unwrap_or_else(|| self.around.transform_by(at));
         [around.mins.to_array(), around.maxs.to_array()]
+    }
+
+    /// How far a body goes on from a point in it, along the y axis of a frame there and against it, m; none where the line meets nothing.
+    pub fn ways_across(&self, frame: &Pose) -> Option<[f64; 2]> {
+        let frame = isometry(frame);
+        let far = 2.0 * (self.reach() + frame.translation.length());
+        let from_outside = |side: f64| {
+            let along = frame.rotation * Vector::new(0.0, side, 0.0);
+            let ray = Ray::new(frame.translation + along * far, -along);
+            let met = self.pieces.iter().filter_map(|piece| piece.shape.cast_ray(&piece.at, &ray, 2.0 * far, true));
+            met.min_by(f64::total_cmp).map(|way| far - way)
+        };
+        Some([from_outside(1.0)?, from_outside(-1.0)?])
     }
 
     /// Whether two bodies reach deeper into each other than this, m; quicker than where and how deep.

@@ -398,12 +398,12 @@ impl<'m> Sim<'m> {
     /// Hands on what has moved.
     fn tell_matter(&mut self, out: &mut dyn Listener) {
         let Some(matter) = self.matter.as_mut() else { return };
-        let (moments, strays) = matter.told();
+        let (moments, sightings) = matter.told();
         if !moments.is_empty() {
             out.travels(&moments);
         }
-        if !strays.is_empty() {
-            out.strays(&strays);
+        if !sightings.is_empty() {
+            out.sightings(&sightings);
         }
     }
 

@@ -60,7 +60,7 @@ impl<'p> Matter<'p> {
             fixtures,
             event: None,
             moments: Vec::new(),
-            strays: Vec::new(),
+            sightings: Vec::new(),
             unknown,
             shown: 0,
         };
@@ -94,7 +94,10 @@ impl Builder<'_, '_> {
         for index in 0..stage.scene.instances.len() as u32 {
             let id = InstanceId(index);
             let Some(body) = stage.bodies().get(index as usize).and_then(Option::as_ref) else { continue };
-            if stage.actor_of(id).is_some() || stage.is_inside_a_shape(id) {
+            // What a robot is made of beside its links stands where it stands.
+            let stands = stage.actors.get(&id).is_some_and(|actor| actor.drive.is_empty());
+            let is_apart = stage.actor_of(id).is_none() && !stage.is_inside_a_shape(id);
+            if !stands && !is_apart {
                 continue;
             }
             parts

@@ -271,7 +271,7 @@ impl Matter<'_> {
                 }
                 if held.is_none() {
                     let touches = self.pressed(body);
-                    self.strays.push(super::Stray { time: self.time(), thing, at: Some(at), touches });
+                    self.sightings.push(super::Sighting { time: self.time(), thing, at: Some(at), touches });
                 }
                 out.push(Found { thing, at, held, on });
             }

@@ -25,6 +25,8 @@ use crate::motion::{Actor, Moment, Performed, Stage};
 /// Longest time between two moments that are told, s; while fingers move.
 const FRAME: f64 = 0.04;
 const FINE: f64 = 0.005;
+/// Fingers whose speed changes by more within a step have struck something, m/s.
+const STRUCK: f64 = 0.02;
 /// No planned motion of fingers is faster than this, m/s.
 const FAST: f64 = 1.0;
 /// Fingers that are slower than this stand, m/s.
@@ -57,7 +59,7 @@ impl Default for Really {
 
 /// A loose thing at a time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stray {
+pub struct Sighting {
     /// s since the run began.
     pub time: f64,
     /// The thing.
@@ -98,7 +100,7 @@ pub struct Matter<'p> {
     event: Option<Event>,
     /// What has not been recorded yet.
     moments: Vec<Moment>,
-    strays: Vec<Stray>,
+    sightings: Vec<Sighting>,
     /// Things of which no friction is known.
     unknown: BTreeSet<InstanceId>,
     /// The number of the last moment that was shown.
@@ -327,11 +329,12 @@ impl Matter<'_> {
     }
 
     fn step(&mut self) {
-        let next = self.time() + STEP;
+        let (next, before) = (self.time() + STEP, self.closing());
         for machine in self.machines.values_mut() {
             machine.lead(&mut self.world, next);
         }
         self.world.step();
+        self.show_struck(before);
         let moves = |hand: &Hand| self.world.opening(hand.grip).abs() > SLOW;
         let fingers = self.machines.values().filter_map(|machine| machine.hand.as_ref()).any(moves);
         let apart = if fingers { FINE } else { FRAME };
@@ -343,11 +346,38 @@ impl Matter<'_> {
         }
     }
 
+    /// Robots whose fingers move, as they are now, with how fast these open, m/s.
+    fn closing(&self) -> Vec<(Moment, f64)> {
+        let time = self.time();
+        let hands = self.machines.iter().filter_map(|(robot, machine)| {
+            let speed = self.world.opening(machine.hand.as_ref()?.grip);
+            (speed.abs() > SLOW).then(|| (self.moment(*robot, machine, time), speed))
+        });
+        hands.collect()
+    }
+
+    /// Notes fingers that something has stopped within the last step, as they were before it and as they are now: between moments that are
+    /// farther apart their speed would tell another way than they went.
+    fn show_struck(&mut self, before: Vec<(Moment, f64)>) {
+        for (moment, speed) in before {
+            let robot = moment.robot;
+            let Some(machine) = self.machines.get(&robot) else { continue };
+            let now = machine.hand.as_ref().map_or(0.0, |hand| self.world.opening(hand.grip));
+            if (now - speed).abs() < STRUCK || machine.underway.is_none() {
+                continue;
+            }
+            let after = self.moment(robot, machine, self.time());
+            let told = self.moments.iter().rev().find(|told| told.robot == robot).map(|told| told.time);
+            self.moments.extend([moment, after].into_iter().filter(|m| told.is_none_or(|told| m.time > told)));
+        }
+    }
+
     /// Notes where robots and loose things are now.
     fn show(&mut self) {
         let time = self.time();
         for (robot, machine) in &self.machines {
-            if machine.underway.is_some() {
+            let told = self.moments.iter().any(|told| (told.robot, told.time) == (*robot, time));
+            if machine.underway.is_some() && !told {
                 self.moments.push(self.moment(*robot, machine, time));
             }
         }
@@ -356,7 +386,7 @@ impl Matter<'_> {
             if !self.world.is_still(thing.body) {
                 let at = (!held.contains(id)).then(|| self.world.pose(thing.body));
                 let touches = self.pressed(thing.body);
-                self.strays.push(Stray { time, thing: *id, at, touches });
+                self.sightings.push(Sighting { time, thing: *id, at, touches });
             }
         }
     }
@@ -401,8 +431,8 @@ impl Matter<'_> {
     }
 
     /// What has moved since this was last asked, in order of time.
-    pub fn told(&mut self) -> (Vec<Moment>, Vec<Stray>) {
-        (std::mem::take(&mut self.moments), std::mem::take(&mut self.strays))
+    pub fn told(&mut self) -> (Vec<Moment>, Vec<Sighting>) {
+        (std::mem::take(&mut self.moments), std::mem::take(&mut self.sightings))
     }
 
     fn tip(&self, machine: &Machine) -> Pose {

@@ -5,7 +5,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Span, Unit};
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Stray;
+use crate::contact::Sighting;
 use crate::motion::{Burden, Moment};
 
 use super::failure::{FailureTrace, Measured};
@@ -135,7 +135,7 @@ pub trait Listener: Observer {
     /// A robot begins to move: where it is from moment to moment until it stands still again.
     fn travels(&mut self, moments: &[Moment]) {}
     /// Loose things move by what touches them: where they are from moment to moment.
-    fn strays(&mut self, strays: &[Stray]) {}
+    fn sightings(&mut self, sightings: &[Sighting]) {}
     /// How a thing that a robot carries may be moved from now on.
     fn burdened(&mut self, time: f64, item: InstanceId, burden: Burden) {}
     /// Steps that are asked for now: each is done beside the plan, and its failure is told but ends nothing else.

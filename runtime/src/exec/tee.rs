@@ -6,7 +6,7 @@ use matterix_ir::{NodeId, Unit};
 
 use super::failure::FailureTrace;
 use super::listener::{Alarm, Asked, ExpectationResult, Listener, OperationState, StepState};
-use crate::contact::Stray;
+use crate::contact::Sighting;
 use crate::motion::{Burden, Moment};
 use crate::process::{Engine, Observer};
 
@@ -73,7 +73,7 @@ impl Listener for Tee<'_> {
     both! {
         step(time: f64, step: StepId, state: StepState);
         travels(moments: &[Moment]);
-        strays(strays: &[Stray]);
+        sightings(sightings: &[Sighting]);
         burdened(time: f64, item: InstanceId, burden: Burden);
         operation(time: f64, step: StepId, operation: &Operation, state: OperationState);
         expectation(result: &ExpectationResult);

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::series::{ERROR, Series};
 use super::taken::Taken;
-use crate::contact::Stray;
+use crate::contact::Sighting;
 use crate::exec::{Measured, StepState};
 use crate::motion::{Burden, Moment};
 
@@ -123,7 +123,7 @@ pub struct Recording {
     /// Where robots were while they moved, in order of time.
     pub moments: Vec<Moment>,
     /// Where loose things were while what touched them moved them, in order of time.
-    pub strays: Vec<Stray>,
+    pub sightings: Vec<Sighting>,
     /// How what robots carry may be moved, in order of occurrence.
     pub burdens: Vec<BurdenMark>,
     /// In order of occurrence.
@@ -155,8 +155,8 @@ impl Recording {
     }
 
     /// Loose things move.
-    pub fn strays(&mut self, strays: &[Stray]) {
-        self.strays.extend_from_slice(strays);
+    pub fn sightings(&mut self, sightings: &[Sighting]) {
+        self.sightings.extend_from_slice(sightings);
     }
 
     /// How a thing that a robot carries may be moved changes.

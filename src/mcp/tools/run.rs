@@ -11,11 +11,11 @@ use serde_json::{Map, Value};
 
 use super::Task;
 use super::arguments::{bytes, options};
-use crate::args::RunFidelity;
+use crate::args::{Reality, RunFidelity, perturbation, really};
 use crate::mcp::answer::{Answer, bounded, pruned};
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
-use crate::pipeline::{self, Choices};
+use crate::pipeline;
 use crate::progress::{Kind, Progress};
 
 #[derive(Deserialize, JsonSchema)]
@@ -38,6 +38,12 @@ pub struct Run {
     seed: u64,
     /// How closely motions are simulated; `process` if not given.
     fidelity: Option<RunFidelity>,
+    /// Moves what can be gripped and stands freely by up to so much each way, as the seed has it: `20mm,10deg`.
+    perturb: Option<String>,
+    /// Lets the same things really be so far from where robots take them to be: `2mm,1deg`, with `motion` or `contact`.
+    unseen: Option<String>,
+    /// Lets friction and the force of grips really be such a share of what is said: `friction=0.2,grip=0.5`, with `contact`.
+    really: Option<String>,
     /// Only these members of the report, as `expectations` or `contents`; all that fit if not given.
     members: Option<Vec<String>>,
     /// The most that the answer may take, as text and as data; 60000 if not given.
@@ -77,16 +83,14 @@ impl Task for Run {
     fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let bytes = bytes(self.bytes)?;
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
-        let fidelity = self.fidelity.unwrap_or(RunFidelity::Process);
+        let reality = self.reality()?;
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
-        let Some(program) = program.filter(|_| !is_wrong(&found)) else { return unrun(&sources, found) };
-        if fidelity != RunFidelity::Process {
-            found.extend(pipeline::motions(&program, desk));
-            if is_wrong(&found) {
-                return unrun(&sources, found);
-            }
+        let Some(mut program) = program.filter(|_| !is_wrong(&found)) else { return unrun(&sources, found) };
+        let choices = reality.draw(&mut program, self.seed)?;
+        found.extend(reality.look(&program, desk));
+        if is_wrong(&found) {
+            return unrun(&sources, found);
         }
-        let choices = Choices::plain(self.seed, fidelity);
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
         let ran = pipeline::run(&program, &sources, &choices, stop, &mut progress);
         found.extend(ran.diagnostics.iter().cloned());
@@ -100,6 +104,24 @@ impl Task for Run {
             text += &format!("members of the report that are too large to be sent: {}\n", left_out.join(", "));
         }
         Answer::new(bounded(text, bytes), Ended { passed: ran.passed, report: Some(report), left_out, findings })
+    }
+}
+
+impl Run {
+    /// How closely it is simulated and how the lab really is, as a command line has it.
+    fn reality(&self) -> Result<Reality, String> {
+        let read = |name: &str, why: String| format!("`{name}`: {why}");
+        let moved = |name: &str, text: &Option<String>| {
+            text.as_deref().map(perturbation).transpose().map_err(|why| read(name, why))
+        };
+        let reality = Reality {
+            fidelity: self.fidelity.unwrap_or(RunFidelity::Process),
+            perturb: moved("perturb", &self.perturb)?,
+            unseen: moved("unseen", &self.unseen)?,
+            really: self.really.as_deref().map(really).transpose().map_err(|why| read("really", why))?,
+        };
+        reality.agrees(false)?;
+        Ok(reality)
     }
 }
 

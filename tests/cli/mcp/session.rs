@@ -171,6 +171,13 @@ fn what_does_not_fit_is_said_in_words_and_the_session_goes_on() {
         ("fix", json!({ "path": "w.mtx" }), "either `ids` or `which`"),
         ("fix", json!({ "text": WARM, "which": "all", "write": true }), "no file that could be written"),
         ("run", json!({ "path": "w.mtx", "bytes": 1 }), "`bytes` goes from"),
+        ("run", json!({ "path": "w.mtx", "unseen": "2mm" }), "`--unseen` is of robots that move"),
+        ("run", json!({ "path": "w.mtx", "unseen": "2", "fidelity": "motion" }), "`unseen`: write a length"),
+        (
+            "run",
+            json!({ "path": "w.mtx", "really": "grip=0.5", "fidelity": "motion" }),
+            "it needs `--fidelity contact`",
+        ),
         ("contents", json!({ "path": "w.mtx", "column": 3 }), "a `column` is one of a `line`"),
         ("plan", json!({ "path": "w.mtx", "search": 10000 }), "`search` goes from"),
     ] {

@@ -2,23 +2,65 @@
 //! `finally` behind them do is looked at beside it. What goes wrong there goes wrong on some ways only, and nothing of
 //! it is known afterwards.
 
+use matterix_ir::model::Domain;
 use matterix_ir::plan::{Caught, Motion, Operation, Step, StepId};
+use matterix_ir::scene::InstanceId;
 
 use super::state::AbstractState;
-use super::value::Imprecision;
+use super::value::{AbstractValue, Imprecision};
 use super::{Interpreter, Raised};
 
+/// What a motion fails with after which a hand is empty.
+const LOST: &str = "dropped";
+/// What a motion fails with after which a hand still holds what it held, or does not.
+const MAY_LOSE: [&str; 5] = ["collision", "jammed", "missed", "slip", "toppled"];
+/// The value of a state that points at nothing.
+const NOTHING: f64 = -1.0;
+
 impl Interpreter<'_, '_> {
-    /// Notes what is known where a device may report a failure: as before the operation.
+    /// Notes what is known where a device may report a failure, or a motion fail.
     pub fn may_report(&mut self, operation: &Operation, facts: &AbstractState) {
-        let Some(open) = self.reported.last_mut() else { return };
-        open.extend(operation.fails.iter().map(|name| (name.clone(), facts.clone())));
+        if self.reported.is_empty() {
+            return;
+        }
         // What must not be may come about at any step, and any motion may not be possible: that is followed where somebody has
         // thought of it.
         let named = self.caught.iter().flatten().flatten();
         let by_motion = |name: &str| operation.motion.is_some() && Motion::FAILURES.contains(&name);
         let dangers = named.filter(|name| self.lab.tables.dangers().contains(*name) || by_motion(name));
-        open.extend(dangers.map(|name| (name.clone(), facts.clone())));
+        let names: Vec<String> = operation.fails.iter().chain(dangers).cloned().collect();
+        let raised: Vec<Raised> =
+            names.into_iter().map(|name| (name.clone(), self.as_it_failed(operation, &name, facts))).collect();
+        self.reported.last_mut().into_iter().for_each(|open| open.extend(raised.iter().cloned()));
+    }
+
+    /// What is known where an operation has failed so: as before it, but for what a robot that moved may have lost.
+    fn as_it_failed(&mut self, operation: &Operation, name: &str, facts: &AbstractState) -> AbstractState {
+        let mut failed = facts.clone();
+        let Some(motion) = operation.motion.as_ref().filter(|_| name == LOST || MAY_LOSE.contains(&name)) else {
+            return failed;
+        };
+        let by = motion.mover();
+        let points = |index: &usize| self.lab.states[*index].domain == Domain::Instance;
+        let all: Vec<usize> = (0..self.lab.states.len()).filter(points).collect();
+        let may_be = |index: usize, id: InstanceId| facts.states[index].may_be(f64::from(id.0));
+        // What it carries points at it, and it at that.
+        let borne: Vec<usize> = all.iter().copied().filter(|index| may_be(*index, by)).collect();
+        let hands: Vec<usize> = all
+            .into_iter()
+            .filter(|index| self.lab.state_owner[*index] == by)
+            .filter(|index| borne.iter().any(|item| may_be(*index, self.lab.state_owner[*item])))
+            .collect();
+        let held = |known: &AbstractValue| match name == LOST {
+            true => AbstractValue::Point(NOTHING),
+            false => known.join(&AbstractValue::Point(NOTHING), Imprecision::Paths),
+        };
+        let hands: Vec<(u32, AbstractValue)> =
+            hands.into_iter().map(|index| (index as u32, held(&facts.states[index]))).collect();
+        let borne = borne.into_iter().filter(|_| !hands.is_empty()).map(|index| (index as u32, AbstractValue::top()));
+        let changes = borne.chain(hands.iter().cloned()).collect();
+        self.overwrite(self.site(), changes, &mut failed);
+        failed
     }
 
     /// Follows the handlers of what devices may have reported in a body, then its `finally`; what nothing takes goes on

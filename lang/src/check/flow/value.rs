@@ -117,6 +117,15 @@ impl AbstractValue {
         }
     }
 
+    /// Whether it may be this number.
+    pub fn may_be(&self, value: f64) -> bool {
+        match self {
+            AbstractValue::Point(v) => *v == value,
+            AbstractValue::Few(all, _) => all.contains(&value),
+            AbstractValue::Range(low, high, _) => (*low..=*high).contains(&value),
+        }
+    }
+
     fn values(&self) -> Option<&[f64]> {
         match self {
             AbstractValue::Point(v) => Some(std::slice::from_ref(v)),

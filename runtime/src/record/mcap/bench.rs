@@ -33,7 +33,7 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let mut shown: Vec<Option<(Pose, Tint)>> = vec![None; scene.instances.len()];
     let mut replay = Replay::new(run);
     bodies::write(&replay.stage, sink)?;
-    let mut robots = Robots::begin(&replay.stage, !run.recording.strays.is_empty(), sink, entities, frames)?;
+    let mut robots = Robots::begin(&replay.stage, !run.recording.sightings.is_empty(), sink, entities, frames)?;
     for (index, time) in instants(run, &replay, tints.values()).into_iter().enumerate() {
         let travelled = robots.until(run, time, sink, frames, &mut replay)?;
         let moved = replay.sample(run, time) || index == 0;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand, frame};
 
-use crate::contact::Stray;
+use crate::contact::Sighting;
 use crate::motion::{Carried, Moment, Stage, supported};
 use crate::record::run::Run;
 
@@ -95,8 +95,8 @@ impl<'p> Replay<'p> {
     }
 
     /// A loose thing is somewhere else from now on; what it is, with all that goes along.
-    pub(super) fn strayed(&mut self, stray: &Stray) -> Vec<(InstanceId, Pose)> {
-        let (id, Some(at)) = (stray.thing, stray.at) else { return Vec::new() };
+    pub(super) fn sighted(&mut self, sighting: &Sighting) -> Vec<(InstanceId, Pose)> {
+        let (id, Some(at)) = (sighting.thing, sighting.at) else { return Vec::new() };
         let on = self.stage.stand_of(id);
         self.stage.lies(id, at, on);
         self.freed.insert(id);

@@ -46,8 +46,8 @@ pub(super) struct Robots {
     next: usize,
     /// The first burden that has not been written.
     told: usize,
-    /// The first stray that has not been written.
-    strayed: usize,
+    /// The first sighting that has not been written.
+    sighted: usize,
 }
 
 impl Robots {
@@ -71,7 +71,7 @@ impl Robots {
             hands,
             next: 0,
             told: 0,
-            strayed: 0,
+            sighted: 0,
         };
         if stage.movers().next().is_none() {
             return Ok(out);
@@ -114,7 +114,7 @@ impl Robots {
         let mut travelled = false;
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
-            self.strays(run, moment.time, sink, frames, replay)?;
+            self.sightings(run, moment.time, sink, frames, replay)?;
             replay.moment(moment);
             self.grip(replay, moment, sink)?;
             self.burdens(run, moment.time, sink)?;
@@ -127,13 +127,13 @@ impl Robots {
             }
             places(run, moment.time, replay.along(moment.robot), sink, frames)?;
         }
-        travelled |= self.strays(run, time, sink, frames, replay)?;
+        travelled |= self.sightings(run, time, sink, frames, replay)?;
         self.burdens(run, time, sink)?;
         Ok(travelled)
     }
 
     /// Writes where loose things have moved up to a time, s; whether any have.
-    fn strays<W: Write + Seek>(
+    fn sightings<W: Write + Seek>(
         &mut self,
         run: &Run<'_>,
         time: f64,
@@ -141,15 +141,15 @@ impl Robots {
         frames: u16,
         replay: &mut Replay<'_>,
     ) -> McapResult<bool> {
-        let first = self.strayed;
-        while let Some(stray) = run.recording.strays.get(self.strayed).filter(|stray| stray.time <= time) {
-            self.strayed += 1;
-            places(run, stray.time, replay.strayed(stray), sink, frames)?;
-            let thing = &run.program.scene.get(stray.thing).name;
-            let touched = bodies::Touched { thing, touches: &stray.touches };
-            sink.push(self.contacts, stray.time, &touched)?;
+        let first = self.sighted;
+        while let Some(sighting) = run.recording.sightings.get(self.sighted).filter(|sighting| sighting.time <= time) {
+            self.sighted += 1;
+            places(run, sighting.time, replay.sighted(sighting), sink, frames)?;
+            let thing = &run.program.scene.get(sighting.thing).name;
+            let touched = bodies::Touched { thing, touches: &sighting.touches };
+            sink.push(self.contacts, sighting.time, &touched)?;
         }
-        Ok(self.strayed > first)
+        Ok(self.sighted > first)
     }
 
     /// Writes what is in a hand, with all that goes along, where that is something else than before.

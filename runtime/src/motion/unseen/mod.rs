@@ -3,13 +3,14 @@
 //! The stage that plans has the poses that are believed. The truth is kept beside it, as how far each thing is off in its own
 //! frame: whatever carries a thing takes that along.
 
+mod grip;
+
 use std::collections::BTreeMap;
 
 use matterix_ir::Program;
-use matterix_ir::extent::Body;
 use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
-use matterix_ir::scene::{Frame, InstanceId, Shape, Stand};
+use matterix_ir::scene::{InstanceId, Shape, Stand};
 use matterix_motion::spheres::{Contact, Other, Referee};
 
 use super::carried::Carried;
@@ -129,7 +130,7 @@ impl Unseen {
         let (real, then) = (self.in_stage(before), self.in_stage(after));
         match motion {
             Motion::Grip { item, frame, by } => {
-                let pose = gripped([before, &real], *item, frame, *by)?;
+                let pose = grip::gripped([before, &real], *item, frame, *by)?;
                 self.set(after, *item, pose);
             }
             Motion::Free { item, .. } => self.set(after, *item, left([after, &then], &real, *item)),
@@ -196,73 +197,6 @@ fn mm(m: f64) -> String {
 fn not_modelled(what: String) -> Stray {
     let text = format!("{what}: what happens to it then is not modelled with `--unseen`");
     Stray { at: 0.0, failure: "unmovable", text }
-}
-
-/// Where a thing is once fingers have closed on it: in their middle, and as far off as before along them.
-fn gripped([believed, real]: [&Stage<'_>; 2], item: InstanceId, frame: &str, by: InstanceId) -> Result<Pose, Stray> {
-    let (pose, thought) = (real.pose(item), believed.pose(item));
-    if !is_elsewhere(&pose, &thought) {
-        return Ok(pose);
-    }
-    let scene = real.scene;
-    let (name, hand) = (&scene.get(item).name, &scene.get(by).name);
-    let missed = |text: String| Err(Stray { at: 0.0, failure: "missed", text });
-    let robot = real.actor_of(by).unwrap_or(by);
-    if real.holder(item).is_some_and(|other| other != robot) {
-        return Err(not_modelled(format!("`{hand}` grips `{name}`, which another robot holds askew")));
-    }
-    let tip = real.tip(robot);
-    let held_at = scene.get(item).frames.iter().find(|f| f.name == frame).map_or(Pose::IDENTITY, |f| f.pose);
-    let seen_from_tip = |pose: &Pose| tip.inverse().point(pose.point(held_at.position));
-    let (now, expected) = (seen_from_tip(&pose), seen_from_tip(&thought));
-    let off = [0, 1, 2].map(|k| now[k] - expected[k]);
-    // How wide it is the way the fingers close, turned as it is.
-    let across = Pose { position: held_at.position, ..pose.inverse().then(tip) };
-    let across = Frame { name: String::new(), pose: across, stand: false, link: None };
-    let body = Body { frames: &[across], ..scene.get(item).body() };
-    let actor = real.actors.get(&robot);
-    let fingers = actor.and_then(|actor| Some((actor, actor.fingers.as_ref()?)));
-    let (Some(width), Some((actor, fingers))) = (body.across(""), fingers) else {
-        return Err(not_modelled(format!(
-            "`{hand}` grips `{name}` {} from where it is taken to be, without fingers that move or a known width",
-            mm(apart(now, expected))
-        )));
-    };
-    let Some(ways) = fingers.ways(&actor.tree, &actor.joints, [off[0], 0.0, off[2]]) else {
-        return missed(format!(
-            "the fingers of `{hand}` close beside `{name}`, which is {} from where it is taken to be",
-            mm(apart(now, expected))
-        ));
-    };
-    // A finger stands in the way of its edge on that side.
-    let side = if off[1] < 0.0 { ways[1] + now[1] } else { ways[0] - now[1] };
-    if side < width / 2.0 {
-        let room = (ways[0] + ways[1] - width) / 2.0;
-        return missed(format!(
-            "a finger of `{hand}` hits `{name}`, which is {} off across the fingers: open, they leave {} on either side of it",
-            mm(off[1].abs()),
-            mm(room.max(0.0))
-        ));
-    }
-    if let Some(hole) = real.stand_of(item)
-        && let Some(room) = clearance(real, item, hole)
-        && room < off[1].abs()
-    {
-        return missed(format!(
-            "the fingers of `{hand}` push `{name}` {} aside in `{}`, which leaves it {}",
-            mm(off[1].abs()),
-            scene.get(hole).name,
-            mm(room)
-        ));
-    }
-    let round = scene.get(item).shape.as_ref().is_some_and(Shape::is_round);
-    // Flat sides lie against the fingers then; about what they hold it by, it turns.
-    let about = pose.point(held_at.position);
-    let turned = if round { pose } else { Pose { position: pose.position, ..thought } };
-    let moved = turned.point(held_at.position);
-    let (origin, aside) = (tip.position, tip.point([0.0, -off[1], 0.0]));
-    let position = [0, 1, 2].map(|k| turned.position[k] + about[k] - moved[k] + aside[k] - origin[k]);
-    Ok(Pose { position, ..turned })
 }
 
 /// Where a thing is once it is let go: where the hand left it, or in the middle of its hole.
