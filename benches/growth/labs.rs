@@ -11,7 +11,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub const KINDS: [Kind; 5] = [
+pub const KINDS: [Kind; 6] = [
     Kind {
         name: "beakers",
         text: "heated beakers, each on its own hotplate",
@@ -26,6 +26,12 @@ pub const KINDS: [Kind; 5] = [
         sizes: &[10, 30, 100],
     },
     Kind { name: "plates", text: "plates filled well by well", program: plates, sizes: &[1, 2, 4, 8] },
+    Kind {
+        name: "titrations",
+        text: "carbonate solutions, each titrated with acid at equilibrium",
+        program: titrations,
+        sizes: &[6, 24, 96],
+    },
     Kind { name: "species", text: "species with twice as many reactions", program: species, sizes: &[10, 100, 1000] },
 ];
 
@@ -46,6 +52,29 @@ fn beakers(count: usize) -> String {
     out.push_str("    wait 30 min\n");
     for i in 0..count {
         let _ = writeln!(out, "    stop heating plate{i}");
+    }
+    out.push_str("}\n");
+    out
+}
+
+/// Solutions of sodium carbonate, into each of which acid runs until it is in excess.
+fn titrations(count: usize) -> String {
+    let mut out = String::from(
+        "mtx 1\nuse std::equilibria\nuse std::glassware::Beaker250mL\n\n\
+        capability Burette: Body {\n    param source: Container\n    param sink: Container\n    \
+        process flow while elapsed >= 1 s and elapsed < 101 s { move(0.25 mL/s, from: source, to: sink) }\n}\n\n\
+        asset Feeder: Burette { mass: 1 kg }\n\nlab bench {\n    ambient: 25 degC\n",
+    );
+    for i in 0..count {
+        let soda = 8.0 + i as f64 * 0.01;
+        let _ =
+            writeln!(out, "    soda{i} = Beaker250mL at ({i}, 0, 0) m holding 100 g of water + {soda} mmol of Na2CO3");
+        let _ = writeln!(out, "    acid{i} = Beaker250mL at ({i}, 1, 0) m holding 100 g of water + 90 mmol of HCl");
+        let _ = writeln!(out, "    burette{i} = Feeder {{ source: acid{i}, sink: soda{i} }} at ({i}, 2, 0) m");
+    }
+    out.push_str("}\n\nworkflow titrate in bench {\n    wait 101 s\n");
+    for i in 0..count {
+        let _ = writeln!(out, "    expect acidity(soda{i}.contents) in 1 .. 4");
     }
     out.push_str("}\n");
     out

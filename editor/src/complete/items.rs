@@ -94,7 +94,10 @@ const MANY: &[(&str, &str)] = &[
 const FIELDS: &[(&str, &[&str])] = &[
     ("species", &["formula", "smiles", "reactive_groups", "same_as", "dissolves", "by"]),
     ("reaction", &["rate", "order", "valid", "enthalpy", "template", "requires", "reverse", "reverse_order"]),
-    ("equilibrium", &["constant", "log_constant", "pka", "ksp", "pksp", "analytic", "at", "enthalpy", "valid", "source"]),
+    (
+        "equilibrium",
+        &["constant", "log_constant", "pka", "ksp", "pksp", "analytic", "at", "enthalpy", "valid", "source"],
+    ),
     ("reactive_group", &["title", "smarts", "unless", "members", "above", "source"]),
     ("material", &["title", "friction", "source"]),
     ("framing", &["carries", "frame", "request", "reply", "length", "check", "silence"]),

@@ -65,8 +65,13 @@ impl Database {
         if let Some(name) = wanted.phases.iter().find(|name| !self.phases.iter().any(|p| p.name == **name)) {
             return Err(absent("phase", name));
         }
-        let known: BTreeSet<String> =
-            self.species.iter().flat_map(|e| e.species()).filter_map(super::names::formula).flat_map(|f| super::names::elements(&f)).collect();
+        let known: BTreeSet<String> = self
+            .species
+            .iter()
+            .flat_map(|e| e.species())
+            .filter_map(super::names::formula)
+            .flat_map(|f| super::names::elements(&f))
+            .collect();
         match wanted.elements.iter().find(|name| !known.contains(*name)) {
             Some(name) => Err(absent("element", name)),
             None => Ok(()),
@@ -125,7 +130,10 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
     last_of_each(&mut database.species);
     last_of_each(&mut database.phases);
     match database.species.is_empty() && database.phases.is_empty() {
-        true => Err(Mistake { line: 0, why: "it has no block SOLUTION_SPECIES or PHASES: it is no database of PHREEQC".into() }),
+        true => Err(Mistake {
+            line: 0,
+            why: "it has no block SOLUTION_SPECIES or PHASES: it is no database of PHREEQC".into(),
+        }),
         false => Ok(database),
     }
 }
@@ -151,7 +159,9 @@ fn option(entry: &mut Entry, line: Line<'_>, name: &str, rest: &str) -> Result<(
             entry.gamma = Some((all[0], all.get(1).copied().unwrap_or(0.0)));
         }
         "vm" => entry.volume = leading_numbers(rest),
-        "add_logk" | "add_constant" | "no_check" | "mole_balance" | "mass_balance" => entry.unread = Some(name.to_owned()),
+        "add_logk" | "add_constant" | "no_check" | "mole_balance" | "mass_balance" => {
+            entry.unread = Some(name.to_owned())
+        }
         _ if name.starts_with('a') && "analytical_expression".starts_with(name) || name == "a_e" => {
             entry.analytic = numbers(line, rest, 1..=TERMS)?;
         }

@@ -56,7 +56,9 @@ fn a_module_has_what_the_database_says() {
     has("formula: \"Fe(OH)2\"");
     has("Fe2+ + 2 water <-> FeO2H2(aq) + 2 H+");
     has("Fe3+ + water <-> FeOH^2+ + H+");
-    has("equilibrium Calcite_dissolves: Calcite(s) <-> CO3^2- + Ca2+ { log_constant: -8.48, enthalpy: -9.610648 kJ/mol }");
+    has(
+        "equilibrium Calcite_dissolves: Calcite(s) <-> CO3^2- + Ca2+ { log_constant: -8.48, enthalpy: -9.610648 kJ/mol }",
+    );
     has("molar_volume: 36.9 mL/mol");
     let left: Vec<(&str, &str)> = found.left_out.iter().map(|l| (l.name.as_str(), l.why.as_str())).collect();
     assert_eq!(
@@ -91,7 +93,15 @@ fn what_cannot_be_read_is_said_with_its_line() {
 
 #[test]
 fn formulas_have_their_charges_where_the_language_has_them() {
-    let all = [("Ca+2", "Ca^2+", "Ca2+"), ("CO3-2", "CO3^2-", "CO3^2-"), ("H2PO4-", "H2PO4^-", "H2PO4-"), ("Na+", "Na+", "Na+"), ("Fe+++", "Fe^3+", "Fe3+"), ("Fe2(OH)2+4", "Fe2(OH)2^4+", "Fe2O2H2^4+"), ("CaSO4:2H2O", "CaSO4.2H2O", "CaSO42H2O(aq)")];
+    let all = [
+        ("Ca+2", "Ca^2+", "Ca2+"),
+        ("CO3-2", "CO3^2-", "CO3^2-"),
+        ("H2PO4-", "H2PO4^-", "H2PO4-"),
+        ("Na+", "Na+", "Na+"),
+        ("Fe+++", "Fe^3+", "Fe3+"),
+        ("Fe2(OH)2+4", "Fe2(OH)2^4+", "Fe2O2H2^4+"),
+        ("CaSO4:2H2O", "CaSO4.2H2O", "CaSO42H2O(aq)"),
+    ];
     for (text, written, dissolved) in all {
         assert_eq!(names::written(text), written);
         assert_eq!(names::dissolved(text), dissolved);

@@ -288,7 +288,9 @@ impl<'a> Elaborator<'a> {
     }
 
     fn coefficients_of(&mut self, id: InstanceId, s: SpeciesId, law: DeclId) -> Option<[NodeId; Layout::COEFFICIENTS]> {
-        let Value::List(numbers) = self.call_with(law, vec![Value::Instance(id), Value::Species(s)])? else { return None };
+        let Value::List(numbers) = self.call_with(law, vec![Value::Instance(id), Value::Species(s)])? else {
+            return None;
+        };
         let nodes: Vec<NodeId> = numbers.iter().map(|n| self.value_node(n)).collect::<Option<_>>()?;
         nodes.try_into().ok()
     }

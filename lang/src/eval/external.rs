@@ -278,7 +278,9 @@ impl Elaborator<'_> {
                 let node = self.settled(*m, |_| Some(Part::Strength)).unwrap_or(otherwise.node);
                 Value::Num(Num { node, literal: false, ..otherwise.clone() })
             }
-            (Bound::EquilibriaHold, [Value::Instance(m), Value::Num(t)]) => Value::Bool(self.equilibria_hold(*m, t.node)),
+            (Bound::EquilibriaHold, [Value::Instance(m), Value::Num(t)]) => {
+                Value::Bool(self.equilibria_hold(*m, t.node))
+            }
             (Bound::HeatAtStart, [Value::Instance(m), Value::Num(t)]) => {
                 let node = self.heat_at_start(*m, t.node);
                 let node = node.unwrap_or_else(|| self.graph.number(0.0));
