@@ -74,8 +74,9 @@ fn entry<R>(system: &System, args: &[f64], work: impl FnOnce(&mut Entry) -> R) -
             last.resize_with(KEPT, || None);
         }
         let is_same = |known: &Entry| {
-            let bits = |args: &[f64]| args.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
-            known.system == system.fingerprint && known.args.len() == args.len() && bits(&known.args) == bits(args)
+            let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+            let agrees = || known.args.iter().zip(args).all(is_same);
+            known.system == system.fingerprint && known.args.len() == args.len() && agrees()
         };
         let known = last[place].take().filter(is_same);
         let known = last[place].insert(known.unwrap_or_else(|| Entry {
