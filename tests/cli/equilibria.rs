@@ -81,6 +81,7 @@ fn a_ph_that_the_equilibria_do_not_give_is_warned_of() {
         (all, "100 g of water + 10 mmol of acetic_acid + 10 mmol of NaCl", ""),
         (all, salty, "an ionic strength of 1.20 mol/kg"),
         (all, "100 g of water + 10 mmol of formic_acid", "leaves out what formic_acid does"),
+        (WATER, "100 g of water + 10 mmol of Na2CO3", "leaves out what CO3^2- does"),
         (acid, "100 g of water + 10 mmol of acetic_acid", "leaves out that water splits"),
         (WATER, "100 g of water at 60 degC", "stands ready at 60 degC"),
     ];
@@ -90,6 +91,17 @@ fn a_ph_that_the_equilibria_do_not_give_is_warned_of() {
         let said = flat(&checked.out);
         assert!(said.contains(why) && said.contains("no findings") == why.is_empty(), "{holding}: {said}");
     }
+}
+
+#[test]
+fn constants_that_close_at_one_temperature_only_contradict_each_other() {
+    let dir = folder("enthalpies");
+    let other = "equilibrium base: acetate + water <-> acetic_acid + OH- { log_constant: -9.244, enthalpy: 90 kJ/mol }";
+    let text = format!("use std::equilibria\n{other}");
+    write(&dir, "cup.mtx", cup(&text, "100 g of water", ""));
+    let checked = matterixc_in(&dir, &["check", "cup.mtx"]);
+    let said = flat(&checked.out);
+    assert!(checked.code == 1 && said.contains("at 25 degC, but at 60 degC only for"), "{said}");
 }
 
 #[test]

@@ -99,6 +99,10 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
                 "PHASES" => Block::Phases,
                 _ => Block::Other,
             };
+            if let Some(law) = ["LLNL_AQUEOUS_MODEL_PARAMETERS", "PITZER", "SIT"].iter().find(|law| **law == keyword) {
+                let why = format!("`{law}`: this database follows a law of activity that is not known here");
+                return Err(mistake(line, why));
+            }
             if block == Block::Other && !["SOLUTION_MASTER_SPECIES", "END"].contains(&keyword) {
                 database.others.push((line.number, keyword.to_owned()));
             }

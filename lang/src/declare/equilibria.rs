@@ -42,6 +42,12 @@ impl EquilibriumDef<'_> {
     pub fn involves(&self, s: SpeciesId) -> bool {
         self.terms.iter().any(|(t, _)| *t == s)
     }
+
+    /// Whether two species are on the same side of its equation; none where it lacks one.
+    pub fn sides(&self, a: SpeciesId, b: SpeciesId) -> Option<bool> {
+        let side = |s| self.terms.iter().find(|(t, _)| *t == s).map(|(_, n)| *n > 0.0);
+        Some(side(a)? == side(b)?)
+    }
 }
 
 /// Reads every `equilibrium` item; those with unknown species are reported and left out.

@@ -464,18 +464,22 @@ impl<'a> Elaborator<'a> {
 
     fn check_circle(&mut self, factors: &[f64]) {
         let part: Vec<(usize, f64)> = factors.iter().copied().enumerate().filter(|(_, f)| f.abs() > 1e-9).collect();
-        let mut sum = 0.0;
+        // Where enthalpies contradict each other, the circle is open at other temperatures.
+        let mut sums = [0.0; 2];
         for (e, factor) in &part {
             let Some(Constant { terms, .. }) = self.constant_of(*e) else { return };
             let Some(terms) = terms.iter().map(|term| self.glance(*term)).collect::<Option<Vec<f64>>>() else { return };
-            let of: [f64; Layout::TERMS] =
-                [1.0, 1.0 / STANDARD, STANDARD.ln(), STANDARD, STANDARD.powi(-2), STANDARD.powi(2)];
-            sum += factor * terms.iter().zip(of).map(|(term, of)| term * of).sum::<f64>();
+            for (sum, t) in sums.iter_mut().zip([STANDARD, WARM]) {
+                let of: [f64; Layout::TERMS] = [1.0, 1.0 / t, t.ln(), t, t.powi(-2), t.powi(2)];
+                *sum += factor * terms.iter().zip(of).map(|(term, of)| term * of).sum::<f64>();
+            }
         }
-        let off = (sum / LN_10).abs();
-        if off <= CLOSED {
-            return;
-        }
+        let [off, off_where_warm] = sums.map(|sum| (sum / LN_10).abs());
+        let label = match (off <= CLOSED, off_where_warm <= CLOSED) {
+            (true, true) => return,
+            (false, _) => format!("follows from the others, but for {off:.2} in log10 K"),
+            _ => format!("follows from the others at 25 degC, but at 60 degC only for {off_where_warm:.2} in log10 K"),
+        };
         let names: Vec<String> = part.iter().map(|(e, _)| format!("`{}`", self.tables.equilibria[*e].name)).collect();
         let Some((last, _)) = part.last() else { return };
         let last = &self.tables.equilibria[*last];
@@ -484,7 +488,7 @@ impl<'a> Elaborator<'a> {
             codes::EQUILIBRIA_CONTRADICT,
             last.equation,
             headline,
-            format!("follows from the others, but for {off:.2} in log10 K"),
+            label,
         );
         for (e, _) in &part[..part.len() - 1] {
             let other = &self.tables.equilibria[*e];
@@ -549,6 +553,9 @@ const LIQUID: (f64, f64) = (273.15, 373.15);
 
 /// How far from its temperature a constant without an enthalpy serves, K.
 const NEAR: f64 = 10.0;
+
+/// Another temperature at which constants must agree, K.
+const WARM: f64 = 333.15;
 
 /// Constants agree to this share of a power of ten: tables round.
 const CLOSED: f64 = 0.05;

@@ -79,6 +79,8 @@ enum Bound {
     Activity,
     /// Whether an equilibrium of the file has a species.
     Balanced,
+    /// Whether an equilibrium of the file has two species on different sides, or on the same.
+    Opposed(bool),
     /// The temperature at equilibrium.
     Settled,
     /// The ionic strength that equilibria leave.
@@ -94,6 +96,8 @@ enum Bound {
 const TABLE: &[(&str, Bound)] = &[
     ("activity", Bound::Activity),
     ("balanced", Bound::Balanced),
+    ("opposed", Bound::Opposed(true)),
+    ("alongside", Bound::Opposed(false)),
     ("settled_temperature", Bound::Settled),
     ("settled_strength", Bound::IonicStrength),
     ("equilibria_hold", Bound::EquilibriaHold),
@@ -269,6 +273,10 @@ impl Elaborator<'_> {
             (Bound::Balanced, [Value::Species(s)]) => {
                 let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(*s));
                 Value::Bool(self.graph.number(f64::from(u8::from(is_balanced))))
+            }
+            (Bound::Opposed(apart), [Value::Species(a), Value::Species(b)]) => {
+                let holds = self.tables.equilibria.iter().any(|e| e.sides(*a, *b).is_some_and(|same| same != *apart));
+                Value::Bool(self.graph.number(f64::from(u8::from(holds))))
             }
             (Bound::Settled, [Value::Instance(m), Value::Num(otherwise)]) => {
                 let node = self.settled(*m, |_| Some(Part::Temperature)).unwrap_or(otherwise.node);

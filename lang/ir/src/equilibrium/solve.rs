@@ -564,7 +564,8 @@ impl<'a> Problem<'a> {
                 // What swings is held the more firmly the longer it does.
                 let share = 0.5 / (1.0 + count as f64 / 20.0);
                 for (place, sum) in sums {
-                    x[place] *= math::pow((sum + NO_IONS) / x[place], share);
+                    let shifted = x[place] + NO_IONS;
+                    x[place] = shifted * math::pow((sum + NO_IONS) / shifted, share) - NO_IONS;
                 }
                 let known = &mut x[self.places().temperature()];
                 let limits = (TEMPERATURES.0.max(*known - WARMEST_STEP), TEMPERATURES.1.min(*known + WARMEST_STEP));
@@ -629,7 +630,8 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
     let free = Problem::new(system, args, system.basis.clone());
     let lacking = free.lacking();
     let totals = free.totals(&lacking);
-    if totals.solvent() <= 0.0 {
+    // What could become solvent is none: dry hydroxide holds no water to be dissolved in.
+    if totals.solvent() <= 0.0 || free.given(system.basis.water) <= 0.0 {
         return Some(free.as_given());
     }
     let mut given: Vec<usize> = Vec::new();

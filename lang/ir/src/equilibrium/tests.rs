@@ -326,3 +326,22 @@ fn bounds_hold_what_is_drawn_within_them() {
     }
     assert!(narrow > 500, "{narrow}");
 }
+
+#[test]
+fn what_is_absent_or_dry_is_no_trouble() {
+    let silver = || Sketch::new().equation("-1 AgCl(s) 1 Ag+ 1 Cl-", -9.75, 65.7).build();
+    for all in [&[("Cl-", 1e-3)][..], &[("Ag+", 1e-3)], &[], &[("AgCl(s)", 1e-3)], &[("Ag+", 1e-3), ("Cl-", 1e-3)]] {
+        let mixture = silver().with(&[("water", WATER)]).with(all);
+        assert!((mixture.amount("water") - WATER).abs() < 1e-9, "{all:?}: {}", mixture.amount("water"));
+        let held = mixture.amount("Ag+") + mixture.amount("AgCl(s)");
+        let given: f64 = all.iter().filter(|(name, _)| name.starts_with("Ag")).map(|(_, n)| n).sum();
+        assert!((held - given).abs() < 1e-12, "{all:?}: {held}");
+    }
+    let complex = || Sketch::new().equation("-1 I2 -1 I- 1 I3-", 2.85, 0.0).build();
+    for all in [&[("I2", 1e-3)][..], &[("I-", 1e-3)], &[("I2", 1e-3), ("I-", 1e-2)]] {
+        let mixture = complex().real().with(&[("water", WATER)]).with(all);
+        assert!((mixture.amount("water") - WATER).abs() < 1e-9, "{all:?}: {}", mixture.amount("water"));
+    }
+    let dry = acids().build().with(&[("OH-", 1e-2)]);
+    assert_eq!(dry.amount("OH-"), 1e-2);
+}
