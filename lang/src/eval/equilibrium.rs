@@ -484,12 +484,7 @@ impl<'a> Elaborator<'a> {
         let Some((last, _)) = part.last() else { return };
         let last = &self.tables.equilibria[*last];
         let headline = format!("the constants of {} contradict each other", listed(&names));
-        let mut d = Diagnostic::error(
-            codes::EQUILIBRIA_CONTRADICT,
-            last.equation,
-            headline,
-            label,
-        );
+        let mut d = Diagnostic::error(codes::EQUILIBRIA_CONTRADICT, last.equation, headline, label);
         for (e, _) in &part[..part.len() - 1] {
             let other = &self.tables.equilibria[*e];
             d = d.because(other.equation, format!("`{}` is one of the others", other.name));
