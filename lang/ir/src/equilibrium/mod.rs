@@ -1,13 +1,13 @@
 //! Amounts at equilibrium: what conserved totals, constants and a heat content make of a mixture.
 //!
 //! A [`System`] is mathematics alone: members in a solvent or beside it, and equations between them. Its unknowns are the logarithms of
-//! the activities of a few **masters**, of which all other members are formed ([`basis`]); its conditions are the totals of the masters,
-//! which no equation changes. [`solve`] finds where they are met, with activity coefficients, the temperature and what has
-//! precipitated; [`slopes`] says how the result moves with each argument, by the implicit function theorem.
+//! the activities of a few **masters**, of which all other members are formed (`basis`); its conditions are the totals of the masters,
+//! which no equation changes. `solve` finds where they are met, with activity coefficients, the temperature and what has
+//! precipitated; `slopes` says how the result moves with each argument, by the implicit function theorem.
 //!
 //! *Invariant: a solution is a function of its arguments.* Two ways were compared: to begin where the last solution lies saves iterations,
 //! but then the last digits of a run depend on what was asked before, and a run that is taken up again is another one. So each
-//! solution begins with the totals, and the last ones are kept ([`memo`]).
+//! solution begins with the totals, and the last ones are kept (`memo`).
 
 mod activity;
 mod basis;
