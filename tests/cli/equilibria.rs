@@ -4,7 +4,7 @@ use crate::harness::{flat, folder, matterixc, matterixc_in, root, write};
 
 #[test]
 fn acids_bases_buffers_and_salts_are_those_of_the_textbook() {
-    for case in ["equilibria", "neutralisation"] {
+    for case in ["equilibria", "poured_together"] {
         let file = root().join(format!("tests/cases/{case}.mtx"));
         let ran = matterixc(&["run", file.to_str().expect("the path is text")]);
         assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
