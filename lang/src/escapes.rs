@@ -6,6 +6,7 @@ use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Clause, ClauseKind, Name, Sig};
+use crate::listing::joined;
 use crate::names::verb_text;
 
 /// Names of failures, each with the first statement that it comes from.
@@ -64,10 +65,7 @@ pub(crate) fn fails(clause: &Clause) -> Option<&Vec<Name>> {
 
 fn quoted(escapes: &Escapes) -> String {
     let names: Vec<String> = escapes.keys().map(|n| format!("`{n}`")).collect();
-    match names.split_last() {
-        Some((last, first)) if !first.is_empty() => format!("{} and {last}", first.join(", ")),
-        _ => names.concat(),
-    }
+    joined(&names, "and")
 }
 
 impl Body<'_> {

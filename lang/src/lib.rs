@@ -19,6 +19,7 @@ pub mod inventory;
 mod labs;
 mod labware;
 pub mod library;
+mod listing;
 pub mod load;
 pub mod loader;
 pub mod lower;

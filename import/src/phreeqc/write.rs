@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use matterix_ir::FileId;
+use matterix_ir::equilibrium::STANDARD;
 use matterix_lang::chem::Formula;
 use matterix_lang::syntax::fmt::format;
 
@@ -12,8 +13,7 @@ use super::database::{Database, Entry};
 use super::names::{self, Library};
 use crate::{Imported, LeftOut, Mistake};
 
-/// Temperature of constants, K, and the pressure, bar, at which molar volumes hold.
-const STANDARD: f64 = 298.15;
+/// The pressure at which molar volumes hold, bar.
 const PRESSURE: f64 = 1.013_25;
 
 /// cm3*bar/cal, and the Born coefficient of water at 25 degC, 1/bar (Johnson, Oelkers and Helgeson, Comput. Geosci. 18 (1992) 899).
@@ -93,19 +93,16 @@ impl Writer {
             return true;
         }
         let name = names::dissolved(&entry.name);
-        let volume = if entry.volume.is_empty() { 0.0 } else { apparent_volume(&entry.volume) };
-        let mut item = format!("/// Line {} of the database.\nspecies {name} {{\n", entry.line);
-        let _ = writeln!(item, "    formula: \"{}\"", names::written(&entry.name));
-        let _ = writeln!(item, "    molar_volume: {} mL/mol", number(round(volume, 2)));
-        item.push_str("    heat_capacity: 0 J/(mol*K)\n");
+        let volume = round(if entry.volume.is_empty() { 0.0 } else { apparent_volume(&entry.volume) }, 2);
+        let mut more = String::new();
         if let Some((size, slope)) = entry.gamma {
             if size > 0.0 && formula.charge != 0 {
-                let _ = writeln!(item, "    ion_size: {} nm", number(round(size * 0.1, 6)));
+                let _ = writeln!(more, "    ion_size: {} nm", number(round(size * 0.1, 6)));
             }
-            let _ = writeln!(item, "    salting: {}", number(slope));
+            let _ = writeln!(more, "    salting: {}", number(slope));
         }
-        item.push_str("}\n\n");
-        self.species.push_str(&item);
+        let head = format!("Line {} of the database", entry.line);
+        self.species.push_str(&species(&head, &name, &entry.name, volume, &more));
         self.known.insert(entry.name.clone(), name);
         true
     }
@@ -121,26 +118,19 @@ impl Writer {
                 continue;
             }
             let Some((_, text)) = phase.sides[0].first() else { continue };
-            let Some(formula) = names::formula(text) else {
+            if names::formula(text).is_none() {
                 self.leave_out(phase.line, &phase.name, "its formula has symbols of no element");
                 continue;
-            };
+            }
             let solid = format!("{}(s)", names::word(&phase.name));
             let Some(sides) = self.sides(phase, Some((text, &solid))) else { continue };
             let Some(item) = self.equilibrium(&format!("{}_dissolves", names::word(&phase.name)), &sides, phase) else {
                 continue;
             };
             let volume = phase.volume.first().copied().unwrap_or(0.0);
-            let _ = write!(
-                self.solids,
-                "/// {}, line {} of the database.\nspecies {solid} {{\n    formula: \"{}\"\n    molar_volume: {} mL/mol\n    \
-                 heat_capacity: 0 J/(mol*K)\n}}\n\n{item}",
-                phase.name,
-                phase.line,
-                names::written(text),
-                number(volume),
-            );
-            let _ = formula;
+            let head = format!("{}, line {} of the database", phase.name, phase.line);
+            self.solids.push_str(&species(&head, &solid, text, volume, ""));
+            self.solids.push_str(&item);
         }
     }
 
@@ -246,6 +236,15 @@ impl Writer {
         }
         out
     }
+}
+
+/// An item of a species, its formula as the database writes it and its volume in mL/mol, with further lines.
+fn species(head: &str, name: &str, formula: &str, volume: f64, more: &str) -> String {
+    format!(
+        "/// {head}.\nspecies {name} {{\n    formula: \"{}\"\n    molar_volume: {} mL/mol\n    heat_capacity: 0 J/(mol*K)\n{more}}}\n\n",
+        names::written(formula),
+        number(volume)
+    )
 }
 
 /// Whether all elements of a species are wanted.

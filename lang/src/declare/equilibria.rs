@@ -4,7 +4,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::SpeciesId;
 use super::fields::unknown_fields;
-use super::reactions::check_balance;
+use super::reactions::{check_balance, equation};
 use super::species::{SpeciesTable, field};
 use crate::ast::{Field, ItemKind};
 use crate::names::{Names, used};
@@ -63,13 +63,10 @@ pub fn collect<'a>(
     for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true)) {
         let ItemKind::Equilibrium { name, reactants, products, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "an equilibrium", diagnostics);
-        let left = species.terms(names, decl.module, reactants, diagnostics);
-        let right = species.terms(names, decl.module, products, diagnostics);
-        if left.len() != reactants.len() || right.len() != products.len() {
+        let Some((left, right)) = species.sides(names, decl.module, (reactants, products), diagnostics) else {
             continue;
-        }
-        let equation =
-            Span::to(reactants.first().map_or(name.span, |t| t.span), products.last().map_or(name.span, |t| t.span));
+        };
+        let equation = equation(name, reactants, products);
         let before = diagnostics.len();
         check_balance(species, &left, &right, equation, &name.text, diagnostics);
         check_constant((&name.text, name.span), fields, diagnostics);

@@ -5,13 +5,18 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::fields::{forms, unknown_fields};
 use super::species::{SpeciesTable, field};
 use super::tables::ReactionDef;
-use crate::ast::{ExprKind, Field, FieldValue, ItemKind, Term};
+use crate::ast::{ExprKind, Field, FieldValue, ItemKind, Name, Term};
 use crate::chem::balance::{self, BalanceError, Imbalance};
 use crate::chem::formula::Formula;
 use crate::chem::template::{self, Participant, TemplateError};
 use crate::names::Names;
 
 const FIELDS: &[&str] = &["rate", "order", "valid", "requires", "enthalpy", "template", "reverse", "reverse_order"];
+
+/// Where an equation stands.
+pub fn equation(name: &Name, reactants: &[Term], products: &[Term]) -> Span {
+    Span::to(reactants.first().map_or(name.span, |t| t.span), products.last().map_or(name.span, |t| t.span))
+}
 
 /// Reads every `reaction` item; those with unknown species are reported and left out.
 pub fn collect<'a>(
@@ -24,13 +29,10 @@ pub fn collect<'a>(
         let ItemKind::Reaction { name, reactants, reversible, products, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "a reaction", diagnostics);
         forms(fields, &["order", "reverse_order"], &["template"], diagnostics);
-        let left = species.terms(names, decl.module, reactants, diagnostics);
-        let right = species.terms(names, decl.module, products, diagnostics);
-        if left.len() != reactants.len() || right.len() != products.len() {
+        let Some((left, right)) = species.sides(names, decl.module, (reactants, products), diagnostics) else {
             continue;
-        }
-        let equation =
-            Span::to(reactants.first().map_or(name.span, |t| t.span), products.last().map_or(name.span, |t| t.span));
+        };
+        let equation = equation(name, reactants, products);
         check_balance(species, &left, &right, equation, &name.text, diagnostics);
         check_template(species, &left, &right, fields, diagnostics);
         let terms = |list: &[Term], ids: &[(super::SpeciesId, f64)]| -> Vec<_> {

@@ -64,6 +64,9 @@ pub struct SpeciesTable<'a> {
 /// Fields of a species that say what it is; all others are properties.
 const FIELDS: &[&str] = &["smiles", "formula", "same_as", "dissolves", "by", "reactive_groups"];
 
+/// The species of the left and of the right side of an equation, with their counts.
+pub type Sides = (Vec<(SpeciesId, f64)>, Vec<(SpeciesId, f64)>);
+
 impl<'a> SpeciesTable<'a> {
     /// Reads every `species` item.
     pub fn new(names: &'a Names<'a>, properties: &Properties<'a>, diagnostics: &mut Vec<Diagnostic>) -> Self {
@@ -130,6 +133,19 @@ impl<'a> SpeciesTable<'a> {
             }
         }
         out
+    }
+
+    /// The species of both sides of an equation; none where one is unknown, which is reported.
+    pub fn sides(
+        &self,
+        names: &Names<'_>,
+        module: usize,
+        (left, right): (&[Term], &[Term]),
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Sides> {
+        let known = [left, right].map(|side| self.terms(names, module, side, diagnostics));
+        let [reactants, products] = known;
+        (reactants.len() == left.len() && products.len() == right.len()).then_some((reactants, products))
     }
 
     /// The species a name means in a module.

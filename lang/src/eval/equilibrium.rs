@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use matterix_ir::equilibrium::{Equation, Layout, Member, Part, Phase, System, Written};
+use matterix_ir::equilibrium::{
+    Equation, Layout, Member, Part, Phase, STANDARD, System, Written, rises, terms as terms_at,
+};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
 
@@ -13,6 +15,7 @@ use crate::declare::equilibria::{ANALYTIC, CONSTANTS};
 use crate::declare::species::field;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::{Elaborator, Mode};
+use crate::listing::joined;
 use crate::names::DeclId;
 use crate::units::Dimension;
 
@@ -20,9 +23,6 @@ use crate::units::Dimension;
 const GAS: f64 = 8.314_462_618_153_24;
 
 const LN_10: f64 = std::f64::consts::LN_10;
-
-/// The temperature at which constants are given, where nothing else is said, K.
-const STANDARD: f64 = 298.15;
 
 /// The option of an amount of matter that says what its equilibria rest on besides it: heat content, heat capacity, the temperature at
 /// which heat contents are 0, and the coefficients of [`matterix_ir::equilibrium::Activities`].
@@ -363,10 +363,9 @@ impl<'a> Elaborator<'a> {
             terms[place] = self.multiple(factor, node);
         }
         // What each term adds to the enthalpy, R T^2 d(ln K) / dT.
-        let t = STANDARD;
         let mut enthalpy = self.graph.number(0.0);
-        for (term, by) in terms.into_iter().zip([0.0, -1.0, t, t * t, -2.0 / t, 2.0 * t * t * t]) {
-            let part = self.multiple(GAS * by, term);
+        for (term, rise) in terms.into_iter().zip(rises(STANDARD)) {
+            let part = self.multiple(GAS * STANDARD * STANDARD * rise, term);
             enthalpy = self.graph.binary(BinaryOp::Add, enthalpy, part);
         }
         Some(Constant { terms, enthalpy })
@@ -470,8 +469,7 @@ impl<'a> Elaborator<'a> {
             let Some(Constant { terms, .. }) = self.constant_of(*e) else { return };
             let Some(terms) = terms.iter().map(|term| self.glance(*term)).collect::<Option<Vec<f64>>>() else { return };
             for (sum, t) in sums.iter_mut().zip([STANDARD, WARM]) {
-                let of: [f64; Layout::TERMS] = [1.0, 1.0 / t, t.ln(), t, t.powi(-2), t.powi(2)];
-                *sum += factor * terms.iter().zip(of).map(|(term, of)| term * of).sum::<f64>();
+                *sum += factor * terms.iter().zip(terms_at(t)).map(|(term, of)| term * of).sum::<f64>();
             }
         }
         let [off, off_where_warm] = sums.map(|sum| (sum / LN_10).abs());
@@ -483,7 +481,7 @@ impl<'a> Elaborator<'a> {
         let names: Vec<String> = part.iter().map(|(e, _)| format!("`{}`", self.tables.equilibria[*e].name)).collect();
         let Some((last, _)) = part.last() else { return };
         let last = &self.tables.equilibria[*last];
-        let headline = format!("the constants of {} contradict each other", listed(&names));
+        let headline = format!("the constants of {} contradict each other", joined(&names, "and"));
         let mut d = Diagnostic::error(codes::EQUILIBRIA_CONTRADICT, last.equation, headline, label);
         for (e, _) in &part[..part.len() - 1] {
             let other = &self.tables.equilibria[*e];
@@ -566,14 +564,5 @@ fn expr_of<'f>(fields: &'f [Field], key: &str) -> Option<&'f Expr> {
     match &field(fields, key)?.value {
         FieldValue::Expr(e) => Some(e),
         _ => None,
-    }
-}
-
-/// `a, b and c`.
-fn listed(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
     }
 }

@@ -8,6 +8,7 @@ use matterix_ir::{Env, NodeId};
 
 use super::list::{List, Step, table};
 use super::{Prose, words};
+use crate::listing::joined;
 
 impl Prose<'_, '_> {
     /// The sections before the steps.
@@ -146,7 +147,7 @@ impl Prose<'_, '_> {
                 .map(|p| format!("{} of {}", words::mass(whole * p.share), words::plain(&p.substance)))
                 .collect();
             let label = recipe.label.as_ref().map(|l| format!(" Label it {}.", written(l))).unwrap_or_default();
-            let mix = words::joined(&parts, "and");
+            let mix = joined(&parts, "and");
             let place = self.place(recipe.span);
             steps.push(Step::new(format!(
                 "Make {} of **{}**: mix {mix}.{label} {place}",
@@ -201,7 +202,7 @@ impl Prose<'_, '_> {
             let warm = warm.map(|t| format!(" at {t}")).unwrap_or_default();
             let (vessel, what, place) = (
                 self.instance(self.holder(mixture)).name.clone(),
-                format!("{}{warm}", words::joined(&texts, "and")),
+                format!("{}{warm}", joined(&texts, "and")),
                 self.place(first.span),
             );
             match fills.last_mut() {
@@ -215,7 +216,7 @@ impl Prose<'_, '_> {
                 [first, .., last] if vessels.len() > 4 => vec![format!("**{first}** to **{last}**")],
                 all => all.iter().map(|v| format!("**{v}**")).collect(),
             };
-            Step::new(format!("Put {what} into {each}{}. {place}", words::joined(&names, "and")))
+            Step::new(format!("Put {what} into {each}{}. {place}", joined(&names, "and")))
         });
         List { steps: steps.collect(), ..List::default() }
     }

@@ -19,6 +19,7 @@ use crate::declare::Tables;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
+use crate::listing::joined;
 use crate::lower::Planner;
 use crate::names::DeclId;
 use crate::task::{self, Task};
@@ -57,7 +58,7 @@ pub fn protocol<'a>(tables: &'a Tables<'a>, sources: &Sources, program: &Program
     out.extend(docs(&decl.item.docs));
     if !params.is_empty() {
         let values: Vec<String> = params.iter().filter_map(|p| prose.parameter(&p.name.text)).collect();
-        out.push(format!("With {}.", words::joined(&values, "and")));
+        out.push(format!("With {}.", joined(&values, "and")));
     }
     let source = sources.get(name.span.file).map_or("", |s| s.name.as_str());
     out.push(format!(

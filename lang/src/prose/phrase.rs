@@ -3,6 +3,7 @@
 use super::{Prose, words};
 use crate::ast::{Binary, Expr, ExprKind, MemberKind, Name, Role, Text, TextPart, Unary};
 use crate::eval::Value;
+use crate::listing::joined;
 
 impl<'a> Prose<'a, '_> {
     /// What an expression is called; what constants settle is said with its value.
@@ -104,7 +105,7 @@ impl<'a> Prose<'a, '_> {
             ExprKind::Tuple(items, None) if items.len() == 1 => format!("({})", self.say(&items[0])),
             ExprKind::List(items) => {
                 let items: Vec<String> = items.iter().map(|i| self.say(i)).collect();
-                words::joined(&items, "and")
+                joined(&items, "and")
             }
             _ => format!("`{}`", self.written(e)),
         }
@@ -263,7 +264,7 @@ impl<'a> Prose<'a, '_> {
                 }
                 ExprKind::List(items) => {
                     let items: Vec<String> = items.iter().map(|i| self.say(i)).collect();
-                    format!("{} is {}", self.say(a), words::joined(&items, "or"))
+                    format!("{} is {}", self.say(a), joined(&items, "or"))
                 }
                 ExprKind::Binary(Binary::PlusMinus, ..) => format!("{} is {}", self.say(a), self.say(b)),
                 _ => format!("{} is within {}", self.say(a), self.say(b)),

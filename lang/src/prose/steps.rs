@@ -4,6 +4,7 @@ use super::list::{Group, List, Step};
 use super::{Prose, words};
 use crate::ast::{Binary, Block, Expr, ExprKind, Handlers, Stmt, StmtKind};
 use crate::eval::Value;
+use crate::listing::joined;
 
 /// At most so many members of a set are listed.
 const MOST_LISTED: usize = 12;
@@ -166,7 +167,7 @@ impl<'a> Prose<'a, '_> {
             }
             StmtKind::Claim { assets, body } => {
                 let all: Vec<String> = assets.iter().map(|a| self.say(a)).collect();
-                let text = format!("Keep {} free for this and for nothing else:", words::joined(&all, "and"));
+                let text = format!("Keep {} free for this and for nothing else:", joined(&all, "and"));
                 Step::with(text, self.block(body))
             }
             StmtKind::Fail { name, text } => {

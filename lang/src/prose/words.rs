@@ -43,15 +43,6 @@ pub(super) fn paragraphs(lines: &[String]) -> String {
     out.join("\n\n")
 }
 
-/// `a, b and c`.
-pub(super) fn joined(items: &[String], word: &str) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [all @ .., last] => format!("{} {word} {last}", all.join(", ")),
-    }
-}
-
 /// A unit in print: `degC` is °C, `uL` is µL, `mol/kg` stays.
 pub(super) fn unit(text: &str) -> String {
     let part = |p: &str| match p {

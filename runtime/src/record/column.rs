@@ -1,7 +1,7 @@
 //! States and observables as named columns in the unit they are shown in.
 
 use matterix_ir::Unit;
-use matterix_ir::model::Domain;
+use matterix_ir::model::{Content, Domain};
 
 use super::run::Run;
 use super::series::Series;
@@ -59,6 +59,14 @@ impl<'a> Column<'a> {
         let observable = run.program.model.observables.get(index)?;
         let parts = run.recording.observables.get(index)?.iter().collect();
         Some(Column { name: &observable.name, shown: Shown::Quantity(&observable.unit), parts })
+    }
+
+    /// How much of a species there is: at equilibrium where that settles it.
+    pub(super) fn content(run: &Run<'a>, content: &Content) -> Option<Column<'a>> {
+        match content.settled {
+            Some(index) => Column::observable(run, index as usize),
+            None => Column::state(run, content.state as usize),
+        }
     }
 
     /// All states, then the observables that do not repeat a state's name.

@@ -38,10 +38,6 @@ impl Activities {
         Activities { a: [args[0], args[1], args[2]], b: [args[3], args[4]], most: args[5], lowering: args[6] }
     }
 
-    fn strength(&self, strength: f64) -> f64 {
-        strength.clamp(0.0, self.most)
-    }
-
     /// A and B, and how they grow with temperature.
     fn at(&self, temperature: f64) -> ([f64; 2], [f64; 2]) {
         let t = temperature - STANDARD;
@@ -51,19 +47,37 @@ impl Activities {
     }
 }
 
+/// What the coefficient of an ion is made of, at an ionic strength and a temperature.
+struct Parts {
+    /// Ionic strength that counts.
+    strength: f64,
+    a: f64,
+    b: f64,
+    /// How A and B grow with temperature.
+    rises: [f64; 2],
+    /// The denominator, `1 + (plain + B size) sqrt(I)`.
+    over: f64,
+    /// `sqrt(I) / over - common I`.
+    shape: f64,
+}
+
 impl Coefficients {
+    fn parts(&self, all: &Activities, (strength, temperature): (f64, f64)) -> Parts {
+        let strength = strength.clamp(0.0, all.most);
+        let ([a, b], rises) = all.at(temperature);
+        let over = 1.0 + (self.plain + b * self.size) * strength.sqrt();
+        Parts { strength, a, b, rises, over, shape: strength.sqrt() / over - self.common * strength }
+    }
+
     pub(super) fn of(args: &[f64], layout: Layout, member: usize) -> Coefficients {
         let at = layout.coefficients(member);
         Coefficients { plain: args[at], size: args[at + 1], common: args[at + 2], own: args[at + 3] }
     }
 
-    pub(super) fn coefficient(&self, all: &Activities, charge: f64, strength: f64, temperature: f64) -> Coefficient {
-        let moves = strength < all.most;
-        let strength = all.strength(strength);
+    pub(super) fn coefficient(&self, all: &Activities, charge: f64, around: (f64, f64)) -> Coefficient {
+        let moves = around.0 < all.most;
+        let Parts { strength, a, rises: [a_rise, b_rise], over, shape, .. } = self.parts(all, around);
         let root = strength.sqrt();
-        let ([a, b], [a_rise, b_rise]) = all.at(temperature);
-        let over = 1.0 + (self.plain + b * self.size) * root;
-        let shape = root / over - self.common * strength;
         let by_root = if root == 0.0 { 0.0 } else { 0.5 / (root * over * over) };
         let square = charge * charge;
         let by_strength = -a * square * (by_root - self.common) + self.own;
@@ -76,34 +90,16 @@ impl Coefficients {
     }
 
     /// How the logarithm grows with one of the numbers of [`Activities`].
-    pub(super) fn by_common(
-        &self,
-        all: &Activities,
-        charge: f64,
-        (strength, temperature): (f64, f64),
-        which: usize,
-    ) -> f64 {
-        let strength = all.strength(strength);
-        let root = strength.sqrt();
-        let ([a, b], _) = all.at(temperature);
-        let over = 1.0 + (self.plain + b * self.size) * root;
-        let shape = root / over - self.common * strength;
+    pub(super) fn by_common(&self, all: &Activities, charge: f64, around: (f64, f64), which: usize) -> f64 {
+        let Parts { strength, a, over, shape, .. } = self.parts(all, around);
         let (by_a, by_b) = (-shape, a * self.size * strength / (over * over));
-        let t = temperature - STANDARD;
+        let t = around.1 - STANDARD;
         LN_10 * charge * charge * [by_a, by_a * t, by_a * t * t, by_b, by_b * t, 0.0, 0.0][which]
     }
 
     /// How the logarithm grows with one of its own numbers.
-    pub(super) fn by_own(
-        &self,
-        all: &Activities,
-        charge: f64,
-        (strength, temperature): (f64, f64),
-        which: usize,
-    ) -> f64 {
-        let strength = all.strength(strength);
-        let ([a, b], _) = all.at(temperature);
-        let over = 1.0 + (self.plain + b * self.size) * strength.sqrt();
+    pub(super) fn by_own(&self, all: &Activities, charge: f64, around: (f64, f64), which: usize) -> f64 {
+        let Parts { strength, a, b, over, .. } = self.parts(all, around);
         let by_plain = a * strength / (over * over);
         let square = charge * charge;
         LN_10 * [square * by_plain, square * by_plain * b, square * a * strength, strength][which]

@@ -27,6 +27,7 @@ pub use activity::{Activities, Coefficients};
 use basis::Basis;
 pub use basis::{Circle, Unsettled};
 use solve::Solution;
+pub use solve::{STANDARD, rises, terms};
 
 /// Where a member is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -130,7 +131,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Numbers of [`Activities`].
+    /// Numbers of [`Activities`], which come first.
     pub const ACTIVITIES: usize = 7;
 
     /// Numbers of [`Coefficients`], of each member.
@@ -142,11 +143,6 @@ impl Layout {
     /// How many arguments there are.
     pub fn count(self) -> usize {
         self.reference() + 1
-    }
-
-    /// The numbers of [`Activities`] begin here.
-    pub fn activities(self) -> usize {
-        0
     }
 
     /// The terms of the constant of an equation begin here.

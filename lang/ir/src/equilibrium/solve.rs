@@ -18,8 +18,8 @@ use crate::math;
 /// ln 10.
 pub(super) const LN_10: f64 = std::f64::consts::LN_10;
 
-/// The temperature at which the coefficients of activity are given, K.
-pub(super) const STANDARD: f64 = 298.15;
+/// The temperature at which constants and the coefficients of activity are given, where nothing else is said, K.
+pub const STANDARD: f64 = 298.15;
 
 /// A total below this, in mol per kg of solvent, counts as none: its members are followed linearly from there to nothing and below.
 const TRACE: f64 = 1e-30;
@@ -302,11 +302,11 @@ impl<'a> Problem<'a> {
     /// What follows from the unknowns.
     fn state(&self, x: &[f64], totals: &Totals) -> State {
         let (basis, places) = (&self.basis, self.places());
-        let (strength, temperature) = (x[places.strength()], x[places.temperature()]);
+        let temperature = x[places.temperature()];
         let mut state = State::default();
         self.constants(temperature, &mut state);
         let count = basis.of.len();
-        state.coefficients = (0..count).map(|i| self.coefficient(i, strength, temperature)).collect();
+        state.coefficients = (0..count).map(|i| self.coefficient(i, (x[places.strength()], temperature))).collect();
         state.amounts = vec![0.0; count];
         for &i in &basis.solutes {
             let molality = self.activity(i, &state, x) - state.coefficients[i].ln;
@@ -364,9 +364,9 @@ impl<'a> Problem<'a> {
         state.capacities = (0..basis.of.len()).map(takes).collect();
     }
 
-    fn coefficient(&self, member: usize, strength: f64, temperature: f64) -> Coefficient {
+    fn coefficient(&self, member: usize, around: (f64, f64)) -> Coefficient {
         let charge = self.system.members()[member].charge;
-        self.coefficients(member).coefficient(&self.activities, charge, strength, temperature)
+        self.coefficients(member).coefficient(&self.activities, charge, around)
     }
 
     pub(super) fn coefficients(&self, member: usize) -> Coefficients {
@@ -530,11 +530,12 @@ impl<'a> Problem<'a> {
     fn newton(&self, mut x: Vec<f64>, totals: &Totals) -> Option<(Vec<f64>, State)> {
         let mut best: Option<(f64, Vec<f64>, State)> = None;
         let mut idle = 0;
-        if largest(&self.state(&x, totals).residuals[..self.basis.masters.len()]) > FAR {
+        let mut state = self.state(&x, totals);
+        if largest(&state.residuals[..self.basis.masters.len()]) > FAR {
             self.approach(&mut x, totals);
+            state = self.state(&x, totals);
         }
         for count in 0..MOST_STEPS {
-            let state = self.state(&x, totals);
             let off = largest(&state.residuals);
             if !off.is_finite() {
                 break;
@@ -571,6 +572,7 @@ impl<'a> Problem<'a> {
                 let limits = (TEMPERATURES.0.max(*known - WARMEST_STEP), TEMPERATURES.1.min(*known + WARMEST_STEP));
                 *known = (*known + share * (temperature - *known)).clamp(limits.0, limits.1);
             }
+            state = self.state(&x, totals);
         }
         best.filter(|(off, ..)| *off <= MET).map(|(_, x, state)| (x, state))
     }
@@ -612,13 +614,13 @@ impl State {
     }
 }
 
-/// What the terms of ln K are multiples of, at a temperature.
-pub(super) fn terms(t: f64) -> [f64; Layout::TERMS] {
+/// What the terms of ln K are multiples of, at a temperature in K.
+pub fn terms(t: f64) -> [f64; Layout::TERMS] {
     [1.0, 1.0 / t, math::ln(t), t, 1.0 / (t * t), t * t]
 }
 
-/// How these grow with temperature.
-fn rises(t: f64) -> [f64; Layout::TERMS] {
+/// How these grow with temperature, 1/K each.
+pub fn rises(t: f64) -> [f64; Layout::TERMS] {
     [0.0, -1.0 / (t * t), 1.0 / t, 1.0, -2.0 / (t * t * t), 2.0 * t]
 }
 

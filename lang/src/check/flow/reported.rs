@@ -31,7 +31,9 @@ impl Interpreter<'_, '_> {
         let names: Vec<String> = operation.fails.iter().chain(dangers).cloned().collect();
         let raised: Vec<Raised> =
             names.into_iter().map(|name| (name.clone(), self.as_it_failed(operation, &name, facts))).collect();
-        self.reported.last_mut().into_iter().for_each(|open| open.extend(raised.iter().cloned()));
+        if let Some(open) = self.reported.last_mut() {
+            open.extend(raised);
+        }
     }
 
     /// What is known where an operation has failed so: as before it, but for what a robot that moved may have lost.

@@ -17,6 +17,7 @@ use matterix_ir::{Severity, Span};
 use crate::chem::Pattern;
 use crate::declare::species::SpeciesTable;
 use crate::declare::{SpeciesId, tables::ReactionDef};
+use crate::listing::joined;
 use crate::names::DeclId;
 
 pub use consequence::Consequence;
@@ -85,11 +86,7 @@ impl Incompatibility {
     /// What happens, in words: `heat and fire`.
     pub fn words(&self) -> String {
         let words: Vec<&str> = self.consequences.iter().map(|c| c.words()).collect();
-        match words.as_slice() {
-            [] => "a hazard".into(),
-            [one] => (*one).into(),
-            [all @ .., last] => format!("{} and {last}", all.join(", ")),
-        }
+        if words.is_empty() { "a hazard".to_owned() } else { joined(&words, "and") }
     }
 }
 

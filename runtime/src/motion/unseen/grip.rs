@@ -6,6 +6,7 @@
 use matterix_ir::extent::Body;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{Frame, InstanceId, Shape};
+use matterix_motion::pose::{distance, pose};
 use matterix_solids::{Body as Solid, isometry};
 
 use super::{DEEPER, Stray, apart, clearance, is_elsewhere, mm, not_modelled};
@@ -160,11 +161,11 @@ impl Grip<'_, '_> {
     /// that has it, until both fingers of this one touch it: as far as one of them, pressing alone, overcomes friction.
     fn yields(&self, giver: InstanceId, off: f64, centred: Pose) -> Result<Pose, Stray> {
         let (name, hand, other) = (self.name(self.item), self.name(self.by), self.name(giver));
-        let turned = self.pose.inverse().then(Pose { position: self.pose.position, ..centred });
-        if turned_by(&turned) > GIVES.1 {
+        let (_, turned) = distance(&pose(&self.pose), &pose(&centred));
+        if turned > GIVES.1 {
             return Err(not_modelled(format!(
                 "the fingers of `{hand}` turn `{name}` in those of `{other}`, by {:.1} deg",
-                turned_by(&turned).to_degrees()
+                turned.to_degrees()
             )));
         }
         if off.abs() <= GIVES.0 {
@@ -283,13 +284,4 @@ fn axis(pose: &Pose, k: usize) -> [f64; 3] {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The angle of a turn, rad.
-fn turned_by(pose: &Pose) -> f64 {
-    matterix_motion::pose::distance(
-        &matterix_motion::pose::pose(&Pose::IDENTITY),
-        &matterix_motion::pose::pose(&Pose { position: [0.0; 3], ..*pose }),
-    )
-    .1
 }

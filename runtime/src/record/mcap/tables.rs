@@ -78,10 +78,7 @@ fn contents<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
             .iter()
             .map(|c| model.species.get(c.species as usize).map_or_else(|| c.species.to_string(), |s| s.name.clone()))
             .collect();
-        let amounts = mixture.contents.iter().map(|c| match c.settled {
-            Some(i) => Column::observable(run, i as usize),
-            None => Column::state(run, c.state as usize),
-        });
+        let amounts = mixture.contents.iter().map(|content| Column::content(run, content));
         let concentrations = mixture.concentrations.iter().map(|&i| Column::observable(run, i as usize));
         let properties = mixture.properties.iter().filter_map(|&i| Column::observable(run, i as usize));
         let named = |columns: Vec<Option<Column<'a>>>| -> Vec<Field<'a>> {

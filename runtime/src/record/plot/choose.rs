@@ -197,9 +197,7 @@ fn contents(run: &Run<'_>, mixture: &Mixture) -> Vec<Panel> {
     let name = name_of(run, mixture);
     let given = mixture.concentrations.iter().map(|&i| Column::observable(run, i as usize));
     let columns: Vec<Option<Column<'_>>> = if mixture.concentrations.is_empty() {
-        let settled = |i: u32| Column::observable(run, i as usize);
-        let put = |state: u32| Column::state(run, state as usize);
-        mixture.contents.iter().map(|c| c.settled.map_or_else(|| put(c.state), settled)).collect()
+        mixture.contents.iter().map(|content| Column::content(run, content)).collect()
     } else {
         given.collect()
     };
