@@ -38,6 +38,13 @@ impl Activities {
         Activities { a: [args[0], args[1], args[2]], b: [args[3], args[4]], most: args[5], lowering: args[6] }
     }
 
+    /// What all coefficients share at an ionic strength, in mol/kg, and a temperature in K.
+    pub(super) fn around(&self, strength: f64, temperature: f64) -> Around {
+        let ([a, b], rises) = self.at(temperature);
+        let (moves, strength) = (strength < self.most, strength.clamp(0.0, self.most));
+        Around { moves: moves && strength > 0.0, strength, root: strength.sqrt(), a, b, rises }
+    }
+
     /// A and B, and how they grow with temperature.
     fn at(&self, temperature: f64) -> ([f64; 2], [f64; 2]) {
         let t = temperature - STANDARD;
@@ -47,61 +54,63 @@ impl Activities {
     }
 }
 
-/// What the coefficient of an ion is made of, at an ionic strength and a temperature.
-struct Parts {
-    /// Ionic strength that counts.
+/// What all coefficients share.
+#[derive(Clone, Copy)]
+pub(super) struct Around {
+    /// Whether coefficients move with the ionic strength.
+    moves: bool,
+    /// Ionic strength that counts, and its root.
     strength: f64,
+    root: f64,
     a: f64,
     b: f64,
     /// How A and B grow with temperature.
     rises: [f64; 2],
-    /// The denominator, `1 + (plain + B size) sqrt(I)`.
-    over: f64,
-    /// `sqrt(I) / over - common I`.
-    shape: f64,
 }
 
 impl Coefficients {
-    fn parts(&self, all: &Activities, (strength, temperature): (f64, f64)) -> Parts {
-        let strength = strength.clamp(0.0, all.most);
-        let ([a, b], rises) = all.at(temperature);
-        let over = 1.0 + (self.plain + b * self.size) * strength.sqrt();
-        Parts { strength, a, b, rises, over, shape: strength.sqrt() / over - self.common * strength }
-    }
-
     pub(super) fn of(args: &[f64], layout: Layout, member: usize) -> Coefficients {
         let at = layout.coefficients(member);
         Coefficients { plain: args[at], size: args[at + 1], common: args[at + 2], own: args[at + 3] }
     }
 
-    pub(super) fn coefficient(&self, all: &Activities, charge: f64, around: (f64, f64)) -> Coefficient {
-        let moves = around.0 < all.most;
-        let Parts { strength, a, rises: [a_rise, b_rise], over, shape, .. } = self.parts(all, around);
-        let root = strength.sqrt();
-        let by_root = if root == 0.0 { 0.0 } else { 0.5 / (root * over * over) };
+    /// 1 over the denominator, `1 + (plain + B size) sqrt(I)`; and `sqrt(I) / denominator - common I`.
+    fn shape(&self, around: &Around) -> (f64, f64) {
+        let under = 1.0 / (1.0 + (self.plain + around.b * self.size) * around.root);
+        (under, around.root * under - self.common * around.strength)
+    }
+
+    pub(super) fn coefficient(&self, around: &Around, charge: f64) -> Coefficient {
+        let Around { strength, root, a, rises: [a_rise, b_rise], .. } = *around;
+        let (under, shape) = self.shape(around);
         let square = charge * charge;
-        let by_strength = -a * square * (by_root - self.common) + self.own;
-        let by_size = strength / (over * over);
+        let mut by_strength = 0.0;
+        if around.moves {
+            let by_root = 0.5 * under * under / root;
+            by_strength = LN_10 * (-a * square * (by_root - self.common) + self.own);
+        }
+        let by_size = strength * under * under;
         Coefficient {
             ln: LN_10 * (-a * square * shape + self.own * strength),
-            by_strength: if moves && strength > 0.0 { LN_10 * by_strength } else { 0.0 },
+            by_strength,
             by_warmth: LN_10 * square * (a * by_size * b_rise * self.size - a_rise * shape),
         }
     }
 
     /// How the logarithm grows with one of the numbers of [`Activities`].
-    pub(super) fn by_common(&self, all: &Activities, charge: f64, around: (f64, f64), which: usize) -> f64 {
-        let Parts { strength, a, over, shape, .. } = self.parts(all, around);
-        let (by_a, by_b) = (-shape, a * self.size * strength / (over * over));
-        let t = around.1 - STANDARD;
+    pub(super) fn by_common(&self, around: &Around, charge: f64, t: f64, which: usize) -> f64 {
+        let (under, shape) = self.shape(around);
+        let (by_a, by_b) = (-shape, around.a * self.size * around.strength * under * under);
         LN_10 * charge * charge * [by_a, by_a * t, by_a * t * t, by_b, by_b * t, 0.0, 0.0][which]
     }
 
     /// How the logarithm grows with one of its own numbers.
-    pub(super) fn by_own(&self, all: &Activities, charge: f64, around: (f64, f64), which: usize) -> f64 {
-        let Parts { strength, a, b, over, .. } = self.parts(all, around);
-        let by_plain = a * strength / (over * over);
+    pub(super) fn by_own(&self, around: &Around, charge: f64, which: usize) -> f64 {
+        let (under, _) = self.shape(around);
+        let by_plain = around.a * around.strength * under * under;
         let square = charge * charge;
-        LN_10 * [square * by_plain, square * by_plain * b, square * a * strength, strength][which]
+        LN_10
+            * [square * by_plain, square * by_plain * around.b, square * around.a * around.strength, around.strength]
+                [which]
     }
 }

@@ -22,6 +22,37 @@ impl std::fmt::Display for Unsettled {
     }
 }
 
+/// Rows of which only what is not 0 is kept, in one piece.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sparse {
+    ends: Vec<usize>,
+    entries: Vec<(usize, f64)>,
+}
+
+impl Sparse {
+    /// What is not 0 in a row, by column.
+    pub(super) fn row(&self, row: usize) -> &[(usize, f64)] {
+        let start = if row == 0 { 0 } else { self.ends[row - 1] };
+        &self.entries[start..self.ends[row]]
+    }
+
+    /// All rows.
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[(usize, f64)]> {
+        (0..self.ends.len()).map(|row| self.row(row))
+    }
+}
+
+impl<'a, R: Iterator<Item = &'a f64>> FromIterator<R> for Sparse {
+    fn from_iter<T: IntoIterator<Item = R>>(rows: T) -> Sparse {
+        let mut sparse = Sparse::default();
+        for row in rows {
+            sparse.entries.extend(row.copied().enumerate().filter(|(_, part)| *part != 0.0));
+            sparse.ends.push(sparse.entries.len());
+        }
+        sparse
+    }
+}
+
 /// How members follow from masters.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Basis {
@@ -32,7 +63,11 @@ pub(super) struct Basis {
     /// By member: how much of the solvent.
     pub(super) solvent: Vec<f64>,
     /// By member: all of that which is not 0, masters by their number, the solvent behind them.
-    pub(super) parts: Vec<Vec<(usize, f64)>>,
+    pub(super) parts: Sparse,
+    /// The same without the solvent.
+    pub(super) masters_of: Sparse,
+    /// By member: elementary charges.
+    pub(super) charges: Vec<f64>,
     /// By member: how much of which equations forms it.
     pub(super) by: Vec<Vec<(usize, f64)>>,
     /// The solvent, by member.
@@ -93,18 +128,28 @@ impl Basis {
         let with = |wanted: Phase| (0..count).filter(|i| phase(*i) == wanted).collect();
         let (solutes, solids) = (with(Phase::Solute), with(Phase::Solid));
         let (held, of_held) = (Vec::new(), vec![Vec::new(); count]);
-        let basis =
-            Basis { masters, of, solvent, by, water, solutes, solids, held, of_held, circles, ..Basis::default() };
+        let charges = written.members.iter().map(|m| m.charge).collect();
+        let basis = Basis {
+            masters,
+            of,
+            solvent,
+            by,
+            water,
+            solutes,
+            solids,
+            held,
+            of_held,
+            circles,
+            charges,
+            ..Basis::default()
+        };
         Ok(basis.complete())
     }
 
     /// With what follows from the rest.
     fn complete(mut self) -> Basis {
-        let parts = |(of, solvent): (&Vec<f64>, &f64)| {
-            let all = of.iter().chain([solvent]).copied().enumerate();
-            all.filter(|(_, part)| *part != 0.0).collect()
-        };
-        self.parts = self.of.iter().zip(&self.solvent).map(parts).collect();
+        self.masters_of = self.of.iter().map(|of| of.iter()).collect();
+        self.parts = self.of.iter().zip(&self.solvent).map(|(of, solvent)| of.iter().chain([solvent])).collect();
         self.is_matter = (0..self.masters.len()).map(|c| self.of.iter().all(|of| of[c] >= 0.0)).collect();
         self
     }

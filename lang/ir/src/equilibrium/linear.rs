@@ -3,67 +3,99 @@
 /// Rows one after the other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Matrix {
-    pub(super) size: usize,
-    pub(super) entries: Vec<f64>,
+    size: usize,
+    entries: Vec<f64>,
 }
 
 impl Matrix {
     /// All 0.
-    pub(super) fn new(size: usize) -> Matrix {
-        Matrix { size, entries: vec![0.0; size * size] }
+    pub(super) fn of_size(size: usize) -> Matrix {
+        let mut matrix = Matrix::default();
+        matrix.clear(size);
+        matrix
+    }
+
+    /// Makes all 0, in the memory that it has.
+    pub(super) fn clear(&mut self, size: usize) {
+        self.size = size;
+        self.entries.clear();
+        self.entries.resize(size * size, 0.0);
     }
 
     pub(super) fn at(&mut self, row: usize, column: usize) -> &mut f64 {
         &mut self.entries[row * self.size + column]
     }
 
-    fn row(&self, row: usize) -> &[f64] {
-        &self.entries[row * self.size..(row + 1) * self.size]
+    pub(super) fn row_mut(&mut self, row: usize) -> &mut [f64] {
+        &mut self.entries[row * self.size..(row + 1) * self.size]
     }
 
-    /// Its factors, with the largest entry of each column as pivot; none where it has no inverse.
-    pub(super) fn factor(mut self) -> Option<Factors> {
-        let n = self.size;
-        let mut order: Vec<usize> = (0..n).collect();
-        for k in 0..n {
-            let pivot = (k..n).max_by(|a, b| {
-                let of = |row: &usize| self.entries[row * n + k].abs();
-                of(a).total_cmp(&of(b))
-            })?;
-            let largest = self.entries[pivot * n + k];
-            if largest == 0.0 || !largest.is_finite() {
-                return None;
-            }
-            if pivot != k {
-                order.swap(pivot, k);
-                (0..n).for_each(|j| self.entries.swap(pivot * n + j, k * n + j));
-            }
-            for row in k + 1..n {
-                let factor = self.entries[row * n + k] / largest;
-                self.entries[row * n + k] = factor;
-                if factor != 0.0 {
-                    let (above, below) = self.entries.split_at_mut(row * n);
-                    let (from, to) = (&above[k * n + k + 1..k * n + n], &mut below[k + 1..n]);
-                    to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
-                }
-            }
-        }
-        Some(Factors { matrix: self, order })
+    fn row(&self, row: usize) -> &[f64] {
+        &self.entries[row * self.size..(row + 1) * self.size]
     }
 }
 
 /// A matrix as the product of two triangles.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Factors {
-    matrix: Matrix,
+    pub(super) matrix: Matrix,
     order: Vec<usize>,
 }
 
 impl Factors {
-    /// What the matrix takes to `right`.
-    pub(super) fn solve(&self, right: &[f64]) -> Vec<f64> {
+    /// Those of a matrix; none where it has no inverse.
+    pub(super) fn of(matrix: Matrix) -> Option<Factors> {
+        let mut factors = Factors { matrix, order: Vec::new() };
+        factors.factor().then_some(factors)
+    }
+
+    /// Puts the factors in place of the matrix, with the largest entry of each column as pivot; whether it has an inverse.
+    pub(super) fn factor(&mut self) -> bool {
         let n = self.matrix.size;
-        let mut x: Vec<f64> = self.order.iter().map(|row| right[*row]).collect();
+        self.order.clear();
+        self.order.extend(0..n);
+        let entries = &mut self.matrix.entries;
+        for k in 0..n {
+            let (mut pivot, mut largest) = (k, entries[k * n + k].abs());
+            for row in k + 1..n {
+                let of = entries[row * n + k].abs();
+                if of > largest || of.is_nan() {
+                    (pivot, largest) = (row, of);
+                }
+            }
+            if largest == 0.0 || !largest.is_finite() {
+                return false;
+            }
+            if pivot != k {
+                self.order.swap(pivot, k);
+                (0..n).for_each(|j| entries.swap(pivot * n + j, k * n + j));
+            }
+            let (above, below) = entries.split_at_mut((k + 1) * n);
+            let from = &above[k * n..];
+            let by = 1.0 / from[k];
+            for to in below.chunks_exact_mut(n) {
+                if to[k] != 0.0 {
+                    let factor = to[k] * by;
+                    to[k] = factor;
+                    to[k + 1..].iter_mut().zip(&from[k + 1..]).for_each(|(to, from)| *to -= factor * from);
+                }
+            }
+        }
+        true
+    }
+
+    /// What the matrix takes to `right`.
+    pub(super) fn solve(&self, right: Vec<f64>) -> Vec<f64> {
+        let mut x = Vec::with_capacity(right.len());
+        self.solve_into(&right, &mut x);
+        x
+    }
+
+    /// The same, in memory that is there.
+    pub(super) fn solve_into(&self, right: &[f64], x: &mut Vec<f64>) {
+        let n = self.matrix.size;
+        x.clear();
+        x.extend(self.order.iter().map(|row| right[*row]));
         let dot = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
         for k in 0..n {
             x[k] -= dot(&self.matrix.row(k)[..k], &x[..k]);
@@ -72,6 +104,5 @@ impl Factors {
             let row = self.matrix.row(k);
             x[k] = (x[k] - dot(&row[k + 1..], &x[k + 1..])) / row[k];
         }
-        x
     }
 }

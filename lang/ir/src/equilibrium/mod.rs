@@ -3,7 +3,7 @@
 //! A [`System`] is mathematics alone: members in a solvent or beside it, and equations between them. Its unknowns are the logarithms of
 //! the activities of a few **masters**, of which all other members are formed (`basis`); its conditions are the totals of the masters,
 //! which no equation changes. `solve` finds where they are met, with activity coefficients, the temperature and what has
-//! precipitated; `slopes` says how the result moves with each argument, by the implicit function theorem.
+//! precipitated, by Newton's method (`newton`) on what follows from the unknowns (`state`); `slopes` says how the result moves with each argument, by the implicit function theorem.
 //!
 //! *Invariant: a solution is a function of its arguments.* Two ways were compared: to begin where the last solution lies saves iterations,
 //! but then the last digits of a run depend on what was asked before, and a run that is taken up again is another one. So each
@@ -14,8 +14,11 @@ mod basis;
 mod bounds;
 mod linear;
 mod memo;
+mod newton;
+mod problem;
 mod slopes;
 mod solve;
+mod state;
 #[cfg(test)]
 mod tests;
 

@@ -1,7 +1,9 @@
 //! How a solution moves with its arguments: the conditions stay met, so `F_x dx + F_a da = 0`.
 
 use super::basis::Basis;
-use super::solve::{Point, Problem, Solution, terms};
+use super::linear::Factors;
+use super::problem::Problem;
+use super::solve::{Point, STANDARD, Solution, terms};
 use super::{Member, Part, Phase, Role, System};
 
 /// The number of the activity of the solvent among [`super::Activities`].
@@ -10,6 +12,8 @@ const LOWERING: usize = super::Layout::ACTIVITIES - 1;
 /// Slopes of one solution, found as they are asked for.
 #[derive(Debug, Default)]
 pub(super) struct Slopes {
+    /// How conditions move with the unknowns, once it is known; none within where that has no inverse.
+    factors: Option<Option<Factors>>,
     /// By argument.
     known: Vec<Option<Direction>>,
 }
@@ -32,7 +36,8 @@ impl Slopes {
         if self.known.len() != args.len() {
             self.known = vec![None; args.len()];
         }
-        let direction = self.known[arg].get_or_insert_with(|| direction(&problem, point, arg));
+        let Some(factors) = self.factors.get_or_insert_with(|| point.factors(&problem)) else { return f64::NAN };
+        let direction = self.known[arg].get_or_insert_with(|| direction(&problem, point, factors, arg));
         slope(&problem, point, direction, part, arg)
     }
 }
@@ -51,18 +56,19 @@ fn as_given(problem: &Problem<'_>, part: Part, arg: usize) -> f64 {
     }
 }
 
-fn direction(problem: &Problem<'_>, point: &Point, arg: usize) -> Direction {
+fn direction(problem: &Problem<'_>, point: &Point, factors: &Factors, arg: usize) -> Direction {
     let grown = grown(problem, point, arg);
-    let mut right = problem.moved(&grown, point);
+    let mut right = problem.moved(&grown, &point.state);
     aside(problem, point, arg, &mut right);
     right.iter_mut().for_each(|v| *v = -*v);
-    Direction { step: point.factors.solve(&right), grown }
+    Direction { step: factors.solve(right), grown }
 }
 
 /// How the logarithm of each dissolved member, and of the constant of each solid, grows with an argument while the unknowns stay.
 fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
     let (basis, places) = (&problem.basis, problem.places());
-    let around = (point.x[places.strength()], point.x[places.temperature()]);
+    let temperature = point.x[places.temperature()];
+    let around = problem.activities.around(point.x[places.strength()], temperature);
     let count = basis.of.len();
     match problem.layout.role(arg) {
         Role::Activities(LOWERING) => {
@@ -72,7 +78,7 @@ fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
         Role::Activities(which) => (0..count)
             .map(|i| match problem.system.members()[i] {
                 Member { phase: Phase::Solute, charge, .. } => {
-                    -problem.coefficients(i).by_common(&problem.activities, charge, around, which)
+                    -problem.coefficients(i).by_common(&around, charge, temperature - STANDARD, which)
                 }
                 _ => 0.0,
             })
@@ -81,12 +87,12 @@ fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
             let Member { phase, charge, .. } = problem.system.members()[member];
             let mut grown = vec![0.0; count];
             if phase == Phase::Solute {
-                grown[member] = -problem.coefficients(member).by_own(&problem.activities, charge, around, which);
+                grown[member] = -problem.coefficients(member).by_own(&around, charge, which);
             }
             grown
         }
         Role::Constant(r, term) => {
-            let by = terms(around.1)[term];
+            let by = terms(temperature)[term];
             (0..count).map(|i| by * by_equation(basis, i, r)).collect()
         }
         _ => vec![0.0; count],
@@ -127,7 +133,7 @@ fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
     let formed = |i: usize| state.amounts[i] - problem.given(i);
     match problem.layout.role(arg) {
         Role::Amount(i) => {
-            for (row, of) in &basis.parts[i] {
+            for (row, of) in basis.parts.row(i) {
                 // A total below 0 stands on the other side.
                 let total = point.totals.of[*row];
                 rows[*row] -= of / state.sides[*row][usize::from(total >= 0.0)];
@@ -161,7 +167,7 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
             Phase::Solute => direction.grown[i] * point.state.amounts[i],
             _ => 0.0,
         };
-        problem.growth(&direction.step, point, i) + beside
+        problem.growth(&direction.step, &point.state, i) + beside
     };
     let amount = |i: usize| match basis.held.iter().position(|s| *s == i) {
         Some(k) => {
@@ -176,7 +182,7 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
         Part::Amount(i) => amount(i as usize),
         Part::Activity(i) => {
             let i = i as usize;
-            let formed: f64 = problem.masters_of(i).map(|(c, of)| of * direction.step[c]).sum();
+            let formed: f64 = problem.masters_of(i).iter().map(|(c, of)| of * direction.step[*c]).sum();
             // What makes activities of amounts moves the amount, not the activity.
             let moves_amounts = matches!(role, Role::Activities(0..LOWERING) | Role::Coefficient(..));
             let constant = if moves_amounts { 0.0 } else { direction.grown[i] };

@@ -193,7 +193,7 @@ fn random(seed: u64) -> Mixture {
 fn random_mixtures_are_all_solved() {
     for seed in 0..1_000 {
         let mixture = random(seed);
-        let problem = solve::Problem::new(&mixture.system, &mixture.args, mixture.system.basis.clone());
+        let problem = problem::Problem::new(&mixture.system, &mixture.args, mixture.system.basis.clone());
         let solution = solve::solve(&mixture.system, &mixture.args)
             .unwrap_or_else(|| panic!("mixture {seed}: {:?}", mixture.args));
         let point = solution.point.as_ref().unwrap();

@@ -1,0 +1,158 @@
+//! Newton's method on the logarithms of what makes each total up over what it should be.
+//!
+//! These are nearly linear in the logarithms of activities, so that a handful of steps suffices between femtomoles and kilomoles. A
+//! start that is very far off is brought near by positive continuous fractions first (Carrayrou, Mose and Behra, AIChE J. 48 (2002)
+//! 894), each total by itself.
+
+use super::linear::Factors;
+use super::problem::{Problem, TEMPERATURES, Totals};
+use super::state::{NO_IONS, State};
+use crate::math;
+
+/// A solution meets its conditions to this share.
+const MET: f64 = 1e-11;
+
+/// It is not sought any closer than to the first of these; nor than to the second, after a step from the third, which it squares: what
+/// is left is rounding.
+const CLOSE: f64 = 4e-15;
+const ROUNDED: f64 = 1e-13;
+const SQUARED: f64 = 1e-8;
+
+/// How often Newton's method steps at most.
+const MOST_STEPS: usize = 200;
+
+/// Beyond this logarithm of a total over what it should be it is far off; so often it is brought nearer at most.
+const FAR: f64 = 8.0;
+const MOST_FRACTIONS: usize = 100;
+
+/// From here on activity coefficients move with the rest, unless that has led nowhere for so many steps.
+const NEAR: f64 = 1.0;
+const PATIENCE: usize = 6;
+
+/// From here on they do in any case.
+const VERY_NEAR: f64 = 0.02;
+
+/// How far a logarithm goes in one step at most; less and less, so that nothing swings for ever.
+const LONGEST: f64 = 8.0;
+
+/// How far the temperature goes in one step at most, K.
+const WARMEST_STEP: f64 = 25.0;
+
+/// Where the unknowns are, with what follows.
+struct Best {
+    off: f64,
+    x: Vec<f64>,
+    state: State,
+}
+
+impl Problem<'_> {
+    /// Newton's method; the unknowns and what follows from them. Far from the solution activity coefficients stay as they are while the
+    /// rest moves, and then follow: what they would be along the way is of no use.
+    pub(super) fn newton(&self, mut x: Vec<f64>, totals: &Totals) -> Option<(Vec<f64>, State)> {
+        let places = self.places();
+        let mut state = State::default();
+        self.evaluate(&x, totals, &mut state);
+        if largest(&state.residuals[..self.basis.masters.len()]) > FAR {
+            self.approach(&mut x, totals, &mut state);
+        }
+        let mut best = Best { off: f64::INFINITY, x: Vec::new(), state: State::default() };
+        let mut idle = 0;
+        let (mut factors, mut right, mut step) = (Factors::default(), Vec::new(), Vec::new());
+        for count in 0..MOST_STEPS {
+            let off = largest(&state.residuals);
+            if !off.is_finite() {
+                break;
+            }
+            let is_near = off < NEAR && idle < PATIENCE || off < VERY_NEAR;
+            let free = match (is_near, self.is_isothermal()) {
+                (false, _) => places.strength(),
+                (true, true) => places.temperature(),
+                (true, false) => places.count(),
+            };
+            let is_last = off <= CLOSE || off <= ROUNDED && best.off <= SQUARED;
+            if !is_last {
+                right.clear();
+                right.extend(state.residuals[..free].iter().map(|r| -r));
+                self.jacobian(&state, free, &mut factors.matrix);
+                if !factors.factor() {
+                    return None;
+                }
+                factors.solve_into(&right, &mut step);
+            }
+            let follows = (!is_near && !is_last && largest(&right) < 1.0).then(|| self.surroundings(&state));
+            idle += 1;
+            if off < best.off {
+                idle = 0;
+                best.off = off;
+                best.x.clone_from(&x);
+                std::mem::swap(&mut best.state, &mut state);
+            }
+            if is_last || (idle > 1 && best.off <= MET) {
+                break;
+            }
+            self.step(&mut x, &step, LONGEST / (1.0 + count as f64 / 12.0));
+            if let Some((sums, temperature)) = follows {
+                // What swings is held the more firmly the longer it does.
+                let share = 0.9 / (1.0 + count as f64 / 20.0);
+                for (place, sum) in sums {
+                    let shifted = x[place] + NO_IONS;
+                    x[place] = shifted * math::pow((sum + NO_IONS) / shifted, share) - NO_IONS;
+                }
+                let known = &mut x[places.temperature()];
+                let limits = (TEMPERATURES.0.max(*known - WARMEST_STEP), TEMPERATURES.1.min(*known + WARMEST_STEP));
+                *known = (*known + share * (temperature - *known)).clamp(limits.0, limits.1);
+            }
+            self.evaluate(&x, totals, &mut state);
+        }
+        (best.off <= MET).then_some((best.x, best.state))
+    }
+
+    /// Brings each total near what it should be, one at a time: its master grows by the ratio, to the power that makes the least of its
+    /// members follow.
+    fn approach(&self, x: &mut [f64], totals: &Totals, state: &mut State) {
+        let least: Vec<f64> = (0..self.basis.masters.len()).map(|c| self.least_part(c)).collect();
+        for _ in 0..MOST_FRACTIONS {
+            let mut furthest = 0.0_f64;
+            for (c, least) in least.iter().enumerate() {
+                let [sum, wanted] = state.sides[c];
+                let off = math::ln(wanted / sum);
+                if !off.is_finite() {
+                    return;
+                }
+                furthest = furthest.max(off.abs());
+                // The further off it is, the bolder.
+                let bold = 0.9 - 0.8 * math::exp(-off.abs());
+                x[c] += math::ln(bold * math::exp((off / least).min(500.0)) + 1.0 - bold);
+            }
+            self.evaluate(x, totals, state);
+            if furthest < FAR {
+                return;
+            }
+        }
+    }
+
+    /// The least of a master that a member has.
+    fn least_part(&self, c: usize) -> f64 {
+        let parts = self.basis.of.iter().map(|of| of[c]).filter(|part| *part > 0.0);
+        parts.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Takes a step in the unknowns that are free, as much of it as is not too long.
+    fn step(&self, x: &mut [f64], step: &[f64], most: f64) {
+        let places = self.places();
+        let longest = step[..=places.solvent()].iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        let warmest = step.get(places.temperature()).map_or(0.0, |by| by.abs());
+        let share = 1.0_f64.min(most / longest).min(WARMEST_STEP / warmest);
+        let sums = [places.strength(), places.molality()];
+        let before = sums.map(|place| x[place]);
+        x.iter_mut().zip(step).for_each(|(x, step)| *x += share * step);
+        sums.iter().zip(before).for_each(|(place, before)| x[*place] = x[*place].max(0.1 * before));
+        let temperature = &mut x[places.temperature()];
+        *temperature = temperature.clamp(TEMPERATURES.0, TEMPERATURES.1);
+    }
+}
+
+/// The largest magnitude; not a number where one is none.
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0_f64, |most, v| if v.is_nan() { f64::NAN } else { most.max(v.abs()) })
+}

@@ -1,0 +1,226 @@
+//! A system with its arguments, seen by a basis: what is given, what no equation changes, and where a solution is sought from.
+
+use std::sync::Arc;
+
+use super::activity::{Activities, Coefficients};
+use super::basis::Basis;
+use super::linear::{Factors, Matrix};
+use super::{Layout, System};
+use crate::math;
+
+/// A total below this, in mol per kg of solvent, counts as none: its members are followed linearly from there to nothing and below.
+const TRACE: f64 = 1e-30;
+
+/// The logarithm of an activity of which nothing is known.
+const NEUTRAL: f64 = -16.0;
+
+/// Between which temperatures a solution is sought, K.
+pub(super) const TEMPERATURES: (f64, f64) = (200.0, 700.0);
+
+/// What no equation changes.
+#[derive(Clone, Debug)]
+pub(super) struct Totals {
+    /// By master, not below a trace; that of the solvent behind them.
+    pub(super) of: Vec<f64>,
+    /// Of the solids that are there.
+    pub(super) held: Vec<f64>,
+}
+
+impl Totals {
+    pub(super) fn solvent(&self) -> f64 {
+        self.of.last().copied().unwrap_or(0.0)
+    }
+}
+
+/// Where unknowns stand.
+///
+/// What is held while the rest is sought stands last, so that those that are free are the first ones.
+#[derive(Clone, Copy)]
+pub(super) struct Places {
+    pub(super) masters: usize,
+}
+
+impl Places {
+    pub(super) fn solvent(self) -> usize {
+        self.masters
+    }
+
+    pub(super) fn strength(self) -> usize {
+        self.masters + 1
+    }
+
+    pub(super) fn molality(self) -> usize {
+        self.masters + 2
+    }
+
+    pub(super) fn temperature(self) -> usize {
+        self.masters + 3
+    }
+
+    pub(super) fn count(self) -> usize {
+        self.masters + 4
+    }
+}
+
+/// A system with its arguments, seen by a basis.
+pub(super) struct Problem<'a> {
+    pub(super) system: &'a System,
+    pub(super) args: &'a [f64],
+    pub(super) layout: Layout,
+    pub(super) activities: Activities,
+    pub(super) basis: Arc<Basis>,
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(system: &'a System, args: &'a [f64], basis: Arc<Basis>) -> Self {
+        Problem { system, args, layout: system.layout(), activities: Activities::of(args), basis }
+    }
+
+    pub(super) fn places(&self) -> Places {
+        Places { masters: self.basis.masters.len() }
+    }
+
+    pub(super) fn given(&self, member: usize) -> f64 {
+        self.args[self.layout.amount(member)]
+    }
+
+    /// Whether the temperature is given.
+    pub(super) fn is_isothermal(&self) -> bool {
+        self.args[self.layout.capacity()].is_infinite()
+    }
+
+    pub(super) fn reference(&self) -> f64 {
+        self.args[self.layout.reference()]
+    }
+
+    /// What energies are compared with, J.
+    pub(super) fn energy_scale(&self) -> f64 {
+        self.args[self.layout.capacity()].abs() * 10.0
+    }
+
+    /// The parts of a member that are masters.
+    pub(super) fn masters_of(&self, member: usize) -> &[(usize, f64)] {
+        self.basis.masters_of.row(member)
+    }
+
+    /// What no equation changes, with the traces that are lacking.
+    pub(super) fn totals(&self, lacking: &[f64]) -> Totals {
+        let basis = &self.basis;
+        let mut of = vec![0.0; basis.masters.len() + 1];
+        let mut held = vec![0.0; basis.held.len()];
+        for (i, lacking) in lacking.iter().enumerate() {
+            let given = self.given(i) - lacking;
+            basis.parts.row(i).iter().for_each(|(row, part)| of[*row] += part * given);
+            held.iter_mut().zip(&basis.of_held[i]).for_each(|(held, part)| *held += part * given);
+        }
+        Totals { of, held }
+    }
+
+    /// By master, as a member: what its total is short of a trace; 0 or less.
+    pub(super) fn lacking(&self) -> Vec<f64> {
+        let mut lacking = vec![0.0; self.basis.of.len()];
+        let all = self.totals(&lacking);
+        let least = TRACE * all.solvent().max(0.0) * self.system.written.solvent_mass;
+        for (c, i) in self.basis.masters.iter().enumerate().filter(|(c, _)| self.basis.is_matter[*c]) {
+            lacking[*i] = (all.of[c] - least).min(0.0);
+        }
+        lacking
+    }
+
+    /// Whether there is enough of everything that a solid is made of.
+    pub(super) fn may_be(&self, solid: usize, lacking: &[f64]) -> bool {
+        self.masters_of(solid).iter().all(|(c, _)| lacking[self.basis.masters[*c]] == 0.0)
+    }
+
+    /// For each solid, one of its parts, so that there is little of all of them: its amount is known by that to the last digit. Of the
+    /// ways to give each one a part of its own it is that whose largest total is least.
+    pub(super) fn scarcest(&self, held: &[usize]) -> Vec<usize> {
+        if held.is_empty() {
+            return Vec::new();
+        }
+        let totals = self.totals(&vec![0.0; self.basis.of.len()]).of;
+        let rank = |(c, of): &(usize, f64)| if self.basis.is_matter[*c] { totals[*c] / of } else { f64::INFINITY };
+        let choices: Vec<Vec<(usize, f64)>> = held
+            .iter()
+            .map(|solid| {
+                let mut parts: Vec<(usize, f64)> = self.masters_of(*solid).iter().map(|p| (p.0, rank(p))).collect();
+                parts.sort_by(|a, b| a.1.total_cmp(&b.1));
+                parts
+            })
+            .collect();
+        let mut bounds: Vec<f64> = choices.iter().flatten().map(|(_, rank)| *rank).collect();
+        bounds.sort_by(f64::total_cmp);
+        let paired = bounds.iter().find_map(|most| pairs(&choices, *most)).unwrap_or_default();
+        paired.into_iter().map(|c| self.basis.masters[c]).collect()
+    }
+
+    /// How much of each of some solids another one is made of, if of them alone.
+    pub(super) fn made_of(&self, solid: usize, others: &[usize]) -> Option<Vec<f64>> {
+        let of = |i: usize| &self.basis.of[i];
+        // The normal equations of a few short columns.
+        let mut matrix = Matrix::of_size(others.len());
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for (row, a) in others.iter().enumerate() {
+            for (column, b) in others.iter().enumerate() {
+                *matrix.at(row, column) = dot(of(*a), of(*b));
+            }
+        }
+        let right: Vec<f64> = others.iter().map(|a| dot(of(*a), of(solid))).collect();
+        let shares = Factors::of(matrix)?.solve(right);
+        let left = (0..self.basis.masters.len()).map(|c| {
+            let made: f64 = others.iter().zip(&shares).map(|(a, share)| share * of(*a)[c]).sum();
+            (of(solid)[c] - made).abs()
+        });
+        (left.fold(0.0, f64::max) < 1e-9).then_some(shares)
+    }
+
+    /// Where Newton's method begins, by master: all of it free, or as in a dilute solution where no total says.
+    pub(super) fn start(&self, totals: &Totals) -> Vec<f64> {
+        let solvent = totals.solvent() * self.system.written.solvent_mass;
+        let free = |c: usize| if self.basis.is_matter[c] { math::ln(totals.of[c] / solvent) } else { NEUTRAL };
+        let (heat, capacity) = (self.args[self.layout.heat()], self.args[self.layout.capacity()]);
+        let warm = if self.is_isothermal() { 0.0 } else { heat / capacity };
+        let temperature = (self.reference() + warm).clamp(TEMPERATURES.0, TEMPERATURES.1);
+        let charge = |i: usize| self.system.members()[i].charge;
+        let solutes = self.basis.solutes.iter();
+        let ions: f64 = solutes.map(|i| 0.5 * charge(*i) * charge(*i) * self.given(*i).max(0.0)).sum();
+        let strength = (ions + self.args[self.layout.bystanders()]) / solvent + 1e-7;
+        let solutes: f64 = self.basis.solutes.iter().map(|i| self.given(*i).max(0.0)).sum();
+        let molality = (solutes + self.args[self.layout.bystander_amount()]) / solvent + 1e-7;
+        let mut x: Vec<f64> = (0..self.basis.masters.len()).map(free).collect();
+        x.extend([math::ln(solvent), strength, molality, temperature]);
+        x
+    }
+
+    pub(super) fn coefficients(&self, member: usize) -> Coefficients {
+        Coefficients::of(self.args, self.layout, member)
+    }
+}
+
+/// A choice for each that no other one has, of those up to a rank; none where there is no such.
+fn pairs(choices: &[Vec<(usize, f64)>], most: f64) -> Option<Vec<usize>> {
+    fn find(
+        of: usize,
+        choices: &[Vec<(usize, f64)>],
+        most: f64,
+        has: &mut [Option<usize>],
+        tried: &mut Vec<usize>,
+    ) -> bool {
+        for (choice, _) in choices[of].iter().take_while(|(_, rank)| *rank <= most) {
+            if tried.contains(choice) {
+                continue;
+            }
+            tried.push(*choice);
+            let holder = has.iter().position(|held| *held == Some(*choice));
+            // Who has it takes another one, if there is one.
+            if holder.is_none_or(|other| find(other, choices, most, has, tried)) {
+                has[of] = Some(*choice);
+                return true;
+            }
+        }
+        false
+    }
+    let mut has = vec![None; choices.len()];
+    let all = (0..choices.len()).all(|of| find(of, choices, most, &mut has, &mut Vec::new()));
+    all.then(|| has.into_iter().flatten().collect())
+}

@@ -1,0 +1,293 @@
+//! What follows from the unknowns: constants, amounts, and how far each condition is from being met.
+
+use super::activity::Coefficient;
+use super::linear::Matrix;
+use super::problem::{Problem, Totals};
+use super::{Member, Phase, rises, terms};
+use crate::math;
+
+/// Ions per mass of solvent that do not matter, mol/kg.
+pub(super) const NO_IONS: f64 = 1e-12;
+
+/// What follows from the unknowns.
+#[derive(Clone, Debug, Default)]
+pub(super) struct State {
+    /// For which temperature the constants are, K.
+    warmth: f64,
+    /// By member: ln K of its formation, and how much that grows with temperature.
+    pub(super) constants: Vec<f64>,
+    pub(super) rises: Vec<f64>,
+    /// By member: enthalpy of its formation, J/mol, and the heat capacity that it takes, J/(mol*K).
+    pub(super) enthalpies: Vec<f64>,
+    pub(super) capacities: Vec<f64>,
+    /// By member.
+    pub(super) coefficients: Vec<Coefficient>,
+    /// By member: mol.
+    pub(super) amounts: Vec<f64>,
+    /// By row: what adds to a total, and what it should be; and 1 over each.
+    pub(super) sides: Vec<[f64; 2]>,
+    inverse: Vec<[f64; 2]>,
+    /// Heat capacity, J/K, and the heat that forming took, J.
+    pub(super) capacity: f64,
+    pub(super) heat: f64,
+    /// How far it is above the reference temperature, K.
+    pub(super) warmer: f64,
+    /// Half the sum of amount times charge squared, mol.
+    pub(super) charges: f64,
+    /// All that is dissolved, mol.
+    pub(super) dissolved: f64,
+    /// How far each condition is from being met.
+    pub(super) residuals: Vec<f64>,
+}
+
+impl Problem<'_> {
+    /// What follows from the unknowns, in place of what there was.
+    pub(super) fn evaluate(&self, x: &[f64], totals: &Totals, state: &mut State) {
+        let (basis, places) = (&self.basis, self.places());
+        let temperature = x[places.temperature()];
+        let count = basis.of.len();
+        if state.constants.len() != count || state.warmth != temperature {
+            self.constants(temperature, state);
+        }
+        let around = self.activities.around(x[places.strength()], temperature);
+        state.coefficients.clear();
+        state.coefficients.resize(count, Coefficient::default());
+        state.amounts.clear();
+        state.amounts.resize(count, 0.0);
+        let (mut charges, mut dissolved) = (0.0, 0.0);
+        for &i in &basis.solutes {
+            let charge = basis.charges[i];
+            let coefficient = self.coefficients(i).coefficient(&around, charge);
+            let amount = math::exp(self.activity(i, state, x) - coefficient.ln + x[places.solvent()]);
+            state.coefficients[i] = coefficient;
+            state.amounts[i] = amount;
+            charges += 0.5 * charge * charge * amount;
+            dissolved += amount;
+        }
+        state.charges = charges + self.args[self.layout.bystanders()];
+        state.dissolved = dissolved + self.args[self.layout.bystander_amount()];
+        state.amounts[basis.water] = math::exp(x[places.solvent()]) / self.system.written.solvent_mass;
+        self.balances(state, totals);
+        self.energy(state, temperature);
+        for (place, sum) in self.sums(state) {
+            let per_mass = self.per_mass(sum, state);
+            state.residuals.push((x[place] - per_mass) / (per_mass + NO_IONS));
+        }
+        state.residuals.push(self.energy_residual(state));
+    }
+
+    /// The logarithm of the activity of a dissolved member; how far a solid is above its constant.
+    pub(super) fn activity(&self, member: usize, state: &State, x: &[f64]) -> f64 {
+        let solvent = self.dryness(member) * x[self.places().molality()];
+        state.constants[member] + self.masters_of(member).iter().map(|(c, of)| of * x[*c]).sum::<f64>() + solvent
+    }
+
+    /// How much the logarithm of the activity of a member grows with the molality of all that is dissolved, as the solvent in it has less.
+    pub(super) fn dryness(&self, member: usize) -> f64 {
+        -self.activities.lowering * self.basis.solvent[member]
+    }
+
+    /// Constants, enthalpies and heat capacities of formation.
+    fn constants(&self, temperature: f64, state: &mut State) {
+        let (basis, layout) = (&self.basis, self.layout);
+        let equations = self.system.written.equations.len();
+        let (terms, rises) = (terms(temperature), rises(temperature));
+        let sum_of = |r: usize, by: &[f64]| {
+            let of = &self.args[layout.constant(r)..layout.constant(r + 1)];
+            of.iter().zip(by).map(|(of, by)| of * by).sum::<f64>()
+        };
+        let each: Vec<[f64; 3]> =
+            (0..equations).map(|r| [sum_of(r, &terms), sum_of(r, &rises), self.args[layout.enthalpy(r)]]).collect();
+        let sum = |by: &[(usize, f64)], which: usize| by.iter().map(|(r, by)| by * each[*r][which]).sum::<f64>();
+        let all = |which: usize, to: &mut Vec<f64>| {
+            to.clear();
+            to.extend(basis.by.iter().map(|by| sum(by, which)));
+        };
+        all(0, &mut state.constants);
+        all(1, &mut state.rises);
+        all(2, &mut state.enthalpies);
+        let capacity = |i: usize| self.args[layout.capacity_of(i)];
+        let takes = |i: usize| {
+            let masters: f64 = self.masters_of(i).iter().map(|(c, of)| of * capacity(basis.masters[*c])).sum();
+            let held: f64 = basis.of_held[i].iter().zip(&basis.held).map(|(of, s)| of * capacity(*s)).sum();
+            capacity(i) - masters - held - basis.solvent[i] * capacity(basis.water)
+        };
+        state.capacities.clear();
+        state.capacities.extend((0..basis.of.len()).map(takes));
+        state.warmth = temperature;
+    }
+
+    /// What makes up each total, and that of the solvent.
+    fn balances(&self, state: &mut State, totals: &Totals) {
+        let side = |total: &f64| [(-total).max(0.0), total.max(0.0)];
+        state.sides.clear();
+        state.sides.extend(totals.of.iter().map(side));
+        for (parts, amount) in self.basis.parts.rows().zip(&state.amounts) {
+            for (row, of) in parts {
+                state.sides[*row][usize::from(*of < 0.0)] += (of * amount).abs();
+            }
+        }
+        state.inverse.clear();
+        state.inverse.extend(state.sides.iter().map(|[a, b]| [1.0 / a, 1.0 / b]));
+        state.residuals.clear();
+        state.residuals.extend(state.sides.iter().map(|sides| ratio(*sides)));
+    }
+
+    fn energy(&self, state: &mut State, temperature: f64) {
+        state.warmer = temperature - self.reference();
+        state.heat = 0.0;
+        state.capacity = if self.is_isothermal() { 0.0 } else { self.args[self.layout.capacity()] };
+        for (i, amount) in state.amounts.iter().enumerate() {
+            let formed = amount - self.given(i);
+            state.heat += state.enthalpies[i] * formed;
+            state.capacity += state.capacities[i] * formed;
+        }
+    }
+
+    fn energy_residual(&self, state: &State) -> f64 {
+        if self.is_isothermal() {
+            return state.warmer;
+        }
+        (self.args[self.layout.heat()] - state.heat - state.capacity * state.warmer) / self.energy_scale()
+    }
+
+    /// How conditions move with the unknowns, as many of them as are free.
+    pub(super) fn jacobian(&self, state: &State, free: usize, matrix: &mut Matrix) {
+        let (basis, places) = (&*self.basis, self.places());
+        let (is_near, is_warm) = (places.strength() < free, places.temperature() < free && !self.is_isothermal());
+        let [by_charges, by_dissolved] = [state.charges, state.dissolved].map(|sum| self.by_amount(sum, state));
+        let by_energy = -1.0 / self.energy_scale();
+        matrix.clear(free);
+        for &i in &basis.solutes {
+            let (amount, coefficient, parts) = (state.amounts[i], &state.coefficients[i], basis.masters_of.row(i));
+            let warmth = state.rises[i] - coefficient.by_warmth;
+            let others = [1.0, -coefficient.by_strength, self.dryness(i), warmth];
+            let add = |row: &mut [f64], share: f64| {
+                parts.iter().for_each(|(column, of)| row[*column] += share * of);
+                // Those that are not free are cut off.
+                row[basis.masters.len()..].iter_mut().zip(&others).for_each(|(to, by)| *to += share * by);
+            };
+            for (row, of) in basis.parts.row(i) {
+                let share = of * state.inverse[*row][usize::from(*of < 0.0)];
+                add(matrix.row_mut(*row), share * amount);
+            }
+            if is_near {
+                let charge = basis.charges[i];
+                if charge != 0.0 {
+                    add(matrix.row_mut(places.strength()), -0.5 * charge * charge * by_charges * amount);
+                }
+                add(matrix.row_mut(places.molality()), -by_dissolved * amount);
+            }
+            if is_warm {
+                let heat = state.enthalpies[i] + state.capacities[i] * state.warmer;
+                add(matrix.row_mut(places.temperature()), heat * by_energy * amount);
+            }
+        }
+        let amount = state.amounts[basis.water];
+        self.each_row(basis.water, state, free, |row, share| *matrix.at(row, places.solvent()) += share * amount);
+        for (row, sum) in self.sums(state).into_iter().filter(|(row, _)| *row < free) {
+            let per_mass = self.per_mass(sum, state);
+            *matrix.at(row, row) += 1.0 / (per_mass + NO_IONS);
+            *matrix.at(row, places.solvent()) += per_mass / (per_mass + NO_IONS);
+        }
+        if places.temperature() < free {
+            let by_warmth = if is_warm { state.capacity * by_energy } else { 1.0 };
+            *matrix.at(places.temperature(), places.temperature()) += by_warmth;
+        }
+    }
+
+    /// What the ionic strength and the molality of all are made of, by their unknowns: mol.
+    pub(super) fn sums(&self, state: &State) -> [(usize, f64); 2] {
+        [(self.places().strength(), state.charges), (self.places().molality(), state.dissolved)]
+    }
+
+    /// So much per mass of solvent, mol/kg.
+    pub(super) fn per_mass(&self, amount: f64, state: &State) -> f64 {
+        amount / (state.amounts[self.basis.water] * self.system.written.solvent_mass)
+    }
+
+    /// How much the molality of such an amount should grow with it, as a share of itself.
+    pub(super) fn by_amount(&self, amount: f64, state: &State) -> f64 {
+        self.per_mass(1.0, state) / (self.per_mass(amount, state) + NO_IONS)
+    }
+
+    /// The conditions that move with the amount of a member, of the first ones that are free, and by how much.
+    fn each_row(&self, member: usize, state: &State, free: usize, mut visit: impl FnMut(usize, f64)) {
+        let places = self.places();
+        for (row, of) in self.basis.parts.row(member) {
+            visit(*row, of * state.inverse[*row][usize::from(*of < 0.0)]);
+        }
+        let Member { charge, phase, .. } = self.system.members()[member];
+        if phase == Phase::Solute && places.strength() < free {
+            visit(places.strength(), -0.5 * charge * charge * self.by_amount(state.charges, state));
+            visit(places.molality(), -self.by_amount(state.dissolved, state));
+        }
+        if !self.is_isothermal() && places.temperature() < free {
+            let heat = state.enthalpies[member] + state.capacities[member] * state.warmer;
+            visit(places.temperature(), -heat / self.energy_scale());
+        }
+    }
+
+    /// How much the amount of a member that is no solid grows where the unknowns do.
+    pub(super) fn growth(&self, step: &[f64], state: &State, member: usize) -> f64 {
+        let places = self.places();
+        let amount = state.amounts[member];
+        match self.system.members()[member].phase {
+            Phase::Solvent => amount * step[places.solvent()],
+            Phase::Solid => 0.0,
+            Phase::Solute => {
+                let formed: f64 = self.masters_of(member).iter().map(|(c, of)| of * step[*c]).sum();
+                let Coefficient { by_strength, by_warmth, .. } = state.coefficients[member];
+                let rise = state.rises[member] - by_warmth;
+                let by_solvent = self.dryness(member) * step[places.molality()];
+                let by_others = rise * step[places.temperature()] - by_strength * step[places.strength()] + by_solvent;
+                amount * (formed + step[places.solvent()] + by_others)
+            }
+        }
+    }
+
+    /// How conditions move where the logarithms of amounts of dissolved members grow so, all else the same.
+    pub(super) fn moved(&self, grown: &[f64], state: &State) -> Vec<f64> {
+        let count = self.places().count();
+        let mut rows = vec![0.0; count];
+        for &i in &self.basis.solutes {
+            let growth = grown[i] * state.amounts[i];
+            if growth != 0.0 {
+                self.each_row(i, state, count, |row, share| rows[row] += share * growth);
+            }
+        }
+        rows
+    }
+
+    /// The ionic strength, the molality of all and the temperature that amounts make.
+    pub(super) fn surroundings(&self, state: &State) -> ([(usize, f64); 2], f64) {
+        let warmer = if self.is_isothermal() { 0.0 } else { state.heated(self) };
+        let sums = self.sums(state).map(|(place, sum)| (place, self.per_mass(sum, state)));
+        (sums, self.reference() + warmer)
+    }
+
+    /// How much there is of each solid: what its total holds beyond what is dissolved.
+    pub(super) fn solids(&self, state: &State, totals: &Totals) -> Vec<f64> {
+        let dissolved = |k: usize| -> f64 {
+            let all = state.amounts.iter().zip(&self.basis.of_held);
+            all.map(|(amount, of)| amount * of[k]).sum()
+        };
+        totals.held.iter().enumerate().map(|(k, total)| total - dissolved(k)).collect()
+    }
+}
+
+impl State {
+    /// How far above the reference temperature the heat that is there brings it.
+    fn heated(&self, problem: &Problem<'_>) -> f64 {
+        (problem.args[problem.layout.heat()] - self.heat) / self.capacity
+    }
+}
+
+/// The logarithm of the ratio of two sides.
+fn ratio([sum, wanted]: [f64; 2]) -> f64 {
+    let off = (sum - wanted) / wanted;
+    if off.abs() < 1e-3 {
+        return off * (1.0 - off * (0.5 - off * (1.0 / 3.0 - off * (0.25 - off * (0.2 - off / 6.0)))));
+    }
+    math::ln(sum / wanted)
+}
