@@ -14,17 +14,33 @@ pub fn undefined(graph: &Graph, node: NodeId, value: &mut dyn FnMut(NodeId) -> O
     Search { graph, value, left: MOST_FOLLOWED }.decides(node)
 }
 
+/// So many equilibria are named where they have no solution.
+const MOST_NAMED: usize = 6;
+
 /// Why an operation has no value, in words.
-pub fn why(op: Op) -> &'static str {
-    match op {
+pub fn why(graph: &Graph, operation: NodeId) -> String {
+    let text = match graph.op(operation) {
         Op::Binary(BinaryOp::Div, ..) => "something is divided by 0",
         Op::Unary(UnaryOp::Sqrt, _) => "the root of a number below 0",
         Op::Unary(UnaryOp::Ln, _) => "the logarithm of a number that is not above 0",
         Op::Binary(BinaryOp::Pow, ..) => "a power that no number is",
         Op::Select(..) => "a table is read beyond its first or last point",
-        Op::Solved(..) => "no amounts meet the equilibria",
+        Op::Solved(call, _) => {
+            let equations = graph.call(call).system.equations();
+            let mut names: Vec<String> = equations.iter().map(|e| format!("`{}`", e.name)).collect();
+            if names.len() > MOST_NAMED {
+                let more = names.split_off(MOST_NAMED - 1).len();
+                names.push(format!("{more} more"));
+            }
+            return match names.split_last() {
+                Some((last, [])) => format!("no amounts meet the equilibrium {last}"),
+                Some((last, rest)) => format!("no amounts meet the equilibria {} and {last} together", rest.join(", ")),
+                None => "no amounts meet the equilibria".into(),
+            };
+        }
         _ => "it is too large, or endless less endless",
-    }
+    };
+    text.into()
 }
 
 /// The comparisons of a graph whose sides may be no number: a quotient, a root, what a table says. They are neither true nor false then.

@@ -1,10 +1,10 @@
 //! Equilibria of a mixture: the system of those whose species can be there, and the numbers that it rests on.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use matterix_ir::equilibrium::{
-    Equation, Layout, Member, Part, Phase, STANDARD, System, Written, rises, terms as terms_at,
+    Circle, Equation, Layout, Member, Part, Phase, STANDARD, System, Unsettled, Written, rises, terms as terms_at,
 };
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
@@ -435,16 +435,18 @@ impl<'a> Elaborator<'a> {
 
     /// An equilibrium that follows from those before it must agree with them: each circle of constants closes.
     pub fn check_circles(&mut self, last: usize) {
-        let all: Vec<usize> = (0..=last).collect();
-        let is_water = |s: &SpeciesId| self.tables.species.get(*s).is_water;
-        let mut members: Vec<SpeciesId> = self.tables.species.iter().map(|(s, _)| s).filter(is_water).take(1).collect();
-        for e in &all {
-            let terms = self.tables.equilibria[*e].terms.iter().map(|t| t.0);
-            let new: Vec<SpeciesId> = terms.filter(|s| !members.contains(s)).collect();
-            members.extend(new);
-        }
-        let system = match System::try_from(self.written_system(&members, &all)) {
-            Ok(system) => system,
+        let all = match self.circles.clone() {
+            Some(known) => known,
+            None => {
+                let found = Arc::new(self.all_circles());
+                self.circles.insert(found).clone()
+            }
+        };
+        match &*all {
+            Ok(circles) => circles
+                .iter()
+                .filter(|circle| circle.factors.iter().rposition(|f| f.abs() > NO_PART) == Some(last))
+                .for_each(|circle| self.check_circle(&circle.factors)),
             Err(why) => {
                 let def = &self.tables.equilibria[last];
                 if why.0.contains(&format!("`{}`", def.name)) {
@@ -453,16 +455,24 @@ impl<'a> Elaborator<'a> {
                         Diagnostic::error(codes::EQUILIBRIUM_FORM, def.equation, headline, "needs something dissolved");
                     self.report(d.help("an equilibrium relates what is dissolved in water, or a solid and its ions"));
                 }
-                return;
             }
-        };
-        let ends = |factors: &[f64]| factors.iter().rposition(|f| f.abs() > 1e-9) == Some(last);
-        let circles: Vec<Vec<f64>> = system.circles().iter().map(|c| c.factors.clone()).collect();
-        circles.iter().filter(|factors| ends(factors)).for_each(|factors| self.check_circle(factors));
+        }
+    }
+
+    /// The circles of all equilibria of the file.
+    fn all_circles(&self) -> Result<Vec<Circle>, Unsettled> {
+        let all: Vec<usize> = (0..self.tables.equilibria.len()).collect();
+        let water = self.tables.species.iter().map(|(s, _)| s).find(|s| self.tables.species.get(*s).is_water);
+        let mut members: Vec<SpeciesId> = water.into_iter().collect();
+        let mut known: BTreeSet<SpeciesId> = members.iter().copied().collect();
+        let terms = self.tables.equilibria.iter().flat_map(|e| e.terms.iter().map(|(s, _)| *s));
+        members.extend(terms.filter(|s| known.insert(*s)));
+        let system = System::try_from(self.written_system(&members, &all))?;
+        Ok(system.circles().to_vec())
     }
 
     fn check_circle(&mut self, factors: &[f64]) {
-        let part: Vec<(usize, f64)> = factors.iter().copied().enumerate().filter(|(_, f)| f.abs() > 1e-9).collect();
+        let part: Vec<(usize, f64)> = factors.iter().copied().enumerate().filter(|(_, f)| f.abs() > NO_PART).collect();
         // Where enthalpies contradict each other, the circle is open at other temperatures.
         let mut sums = [0.0; 2];
         for (e, factor) in &part {
@@ -540,6 +550,9 @@ impl<'a> Elaborator<'a> {
         Some((self.graph.binary(BinaryOp::Sub, at, reach), self.graph.binary(BinaryOp::Add, at, reach)))
     }
 }
+
+/// A factor below this is what rounding left.
+const NO_PART: f64 = 1e-9;
 
 /// Temperatures between which water is liquid, K.
 const LIQUID: (f64, f64) = (273.15, 373.15);

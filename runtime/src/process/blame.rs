@@ -71,7 +71,7 @@ impl<'m> Engine<'m> {
     pub(crate) fn defined(&self, node: NodeId) -> Result<(), Fault> {
         let graph = &self.model.graph;
         let Some(operation) = undefined(graph, node, &mut |n| Some(self.eval(n))) else { return Ok(()) };
-        let why = undefined::why(graph.op(operation));
+        let why = undefined::why(graph, operation);
         let message = format!("this has no value: {why}{}", self.values_below(operation));
         Err(Fault::new(codes::NOT_A_NUMBER, self.time, message))
     }

@@ -1,7 +1,7 @@
 //! Operations of the graph in the words of whoever wrote the laws: what fails, and the values of what it is made of.
 
 use matterix_ir::model::Domain;
-use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp, Unit};
+use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp, Unit, undefined};
 
 use super::Engine;
 
@@ -10,18 +10,19 @@ const MOST_VALUES: usize = 3;
 
 impl Engine<'_> {
     /// Why an operation has no finite value now.
-    pub(super) fn why(&self, operation: NodeId) -> &'static str {
-        match self.model.graph.op(operation) {
+    pub(super) fn why(&self, operation: NodeId) -> String {
+        let text = match self.model.graph.op(operation) {
             Op::Binary(BinaryOp::Div, _, b) if self.eval(b) == 0.0 => "a division by zero",
             Op::Unary(UnaryOp::Ln, _) => "the logarithm of a number that is not positive",
             Op::Unary(UnaryOp::Sqrt, _) => "the square root of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) < 0.0 => "a power of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) == 0.0 => "a division by zero",
-            Op::Solved(..) => "equilibria that no amounts meet",
+            Op::Solved(..) => return undefined::why(&self.model.graph, operation),
             Op::Select(..) => "a table that is read beyond its first or last point",
             Op::Local(_) | Op::Reading(_) => "it depends on a value that is not set yet",
             _ => "a number too large",
-        }
+        };
+        text.into()
     }
 
     /// The values that the operand rests on which an operation fails by: `` , where `drum.load` is 0 g ``; empty where none has a name.

@@ -172,7 +172,7 @@ impl Interpreter<'_, '_> {
         // What it rests on is worked out once.
         self.enclose(node, facts);
         let Some(at) = undefined(graph, node, &mut |n| self.values.of(n).exact()) else { return false };
-        let headline = format!("this has no value: {}", why(graph.op(at)));
+        let headline = format!("this has no value: {}", why(graph, at));
         let d = self.at_site(codes::NOT_A_NUMBER, headline, "asked for here".to_string(), self.doubt > 0);
         self.found(d, span);
         true

@@ -32,7 +32,7 @@ pub mod written;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, RwLock};
 
-use matterix_ir::equilibrium::System;
+use matterix_ir::equilibrium::{Circle, System, Unsettled};
 use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
@@ -264,6 +264,8 @@ pub struct Elaborator<'a> {
     pub speciations: BTreeMap<InstanceId, Option<Arc<Speciation>>>,
     /// Systems of equilibria by their species and equations.
     pub systems: Systems,
+    /// Where constants of all equilibria of the file follow from each other, once that was asked for.
+    pub circles: Option<Arc<Result<Vec<Circle>, Unsettled>>>,
     /// What evaluations come upon besides values, where somebody asks: see [`Elaborator::observe`].
     pub observed: Option<Box<observed::Observed>>,
     /// Where a call says of what it takes something, and its sources are looked into.
@@ -362,6 +364,7 @@ impl<'a> Elaborator<'a> {
             touched_flow: false,
             speciations: BTreeMap::new(),
             systems: BTreeMap::new(),
+            circles: None,
             view_values: BTreeMap::new(),
             observed: None,
             looked_into: BTreeSet::new(),
