@@ -66,6 +66,18 @@ impl Chemistry {
             .and("-1 Ca(OH)2(s) 1 Ca++ 2 OH-", -5.2, -18.0)
     }
 
+    /// With half-cells, one of which takes up eight protons, and two metals.
+    pub fn half_cells() -> Chemistry {
+        let log = |electrons: f64, potential: f64| electrons * potential / 0.059_159_6;
+        Chemistry::water()
+            .and("-1 HAc 1 H+ 1 Ac-", -4.756, -0.4)
+            .and("-1 Fe+++ -1 e- 1 Fe++", log(1.0, 0.771), -41.0)
+            .and("-1 Ce++++ -1 e- 1 Ce+++", log(1.0, 1.72), 0.0)
+            .and("-1 MnO4- -8 H+ -5 e- 1 Mn++ 4 water", log(5.0, 1.507), -825.0)
+            .and("-1 Cu++ -2 e- 1 Cu(s)", log(2.0, 0.3419), -65.0)
+            .and("-1 Zn++ -2 e- 1 Zn(s)", log(2.0, -0.7618), 153.0)
+    }
+
     /// Acids of two steps and metals that they bind, until there are so many species or just more; constants as they are common.
     pub fn of_size(species: usize) -> Chemistry {
         let mut draw = Draw::new(species as u64);
@@ -92,7 +104,11 @@ impl Chemistry {
         if let Some(known) = self.written.members.iter().position(|m| m.name == name) {
             return known;
         }
-        let phase = if name.ends_with("(s)") { Phase::Solid } else { Phase::Solute };
+        let phase = match name {
+            "e-" => Phase::Formal,
+            name if name.ends_with("(s)") => Phase::Solid,
+            _ => Phase::Solute,
+        };
         let signs = |sign: char| name.chars().rev().take_while(|c| *c == sign).count() as f64;
         self.written.members.push(Member { name: name.into(), phase, charge: signs('+') - signs('-') });
         self.written.equations.iter_mut().for_each(|e| e.coefficients.push(0.0));

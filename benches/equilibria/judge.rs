@@ -6,6 +6,9 @@ use matterix_ir::equilibrium::{Layout, Part, Phase, System};
 
 const LN_10: f64 = std::f64::consts::LN_10;
 
+/// An amount below this share of the solvent is none.
+const TRACE: f64 = 1e-27;
+
 /// By how much a solution is off.
 #[derive(Clone, Copy, Default)]
 pub struct Gaps {
@@ -80,6 +83,7 @@ pub fn gaps(system: &System, args: &[f64], elements: &[Vec<f64>]) -> Option<Gaps
         match members[i].phase {
             Phase::Solvent => -args[Layout::ACTIVITIES - 1] * molality,
             Phase::Solid => 0.0,
+            Phase::Formal => system.value(Part::Activity(i as u32), args),
             Phase::Solute => (amounts[i] / mass).ln() + LN_10 * own,
         }
     };
@@ -89,11 +93,17 @@ pub fn gaps(system: &System, args: &[f64], elements: &[Vec<f64>]) -> Option<Gaps
         let k = args[layout.constant(r)] + args[layout.constant(r) + 1] / temperature;
         let product: f64 = involved.iter().map(|i| equation.coefficients[*i] * activity(*i)).sum();
         let is_solid = |i: &&usize| members[**i].phase == Phase::Solid;
-        let absent: Vec<usize> = involved.iter().copied().filter(|i| amounts[*i] <= 0.0).collect();
+        let absent: Vec<usize> = involved
+            .iter()
+            .copied()
+            .filter(|i| amounts[*i] <= TRACE * amounts[0] && members[*i].phase != Phase::Formal)
+            .collect();
         let off = match absent.as_slice() {
             [] => (product - k).abs(),
             // A solid that is not there would dissolve: the product of its ions does not exceed its constant.
-            [one] if involved.iter().find(is_solid) == Some(one) => product - k,
+            [one] if involved.iter().find(is_solid) == Some(one) => {
+                (k - product) * equation.coefficients[*one].signum()
+            }
             _ => 0.0,
         };
         found.equations = found.equations.max(off);

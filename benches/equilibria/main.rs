@@ -12,20 +12,31 @@ mod judge;
 use std::time::Instant;
 
 use chemistry::{Chemistry, Draw};
-use matterix_ir::equilibrium::{Part, System};
+use matterix_ir::equilibrium::{Part, Phase, System};
 
-/// Bounds of what is off.
-const EQUATIONS: f64 = 1e-10;
-const KEPT: f64 = 1e-12;
+/// How many of a hundred may have no solution, and bounds of what is off: of equations, and of atoms and charge.
+struct Bounds {
+    failed: u64,
+    equations: f64,
+    kept: f64,
+}
+
+const ACIDS: Bounds = Bounds { failed: 0, equations: 1e-10, kept: 1e-12 };
+
+/// Where half-cells leave the potential open, beyond what rounding tells, there may be no solution; it is never another one.
+const HALF_CELLS: Bounds = Bounds { failed: 2, equations: 1e-6, kept: 1e-11 };
 
 fn main() -> Result<(), String> {
     let args: Vec<String> = std::env::args().collect();
     let given = args.iter().position(|a| a == "--mixtures").and_then(|i| args.get(i + 1));
     let count = given.map_or(Ok(100_000), |n| n.parse::<u64>().map_err(|e| format!("--mixtures {n}: {e}")))?;
-    let fine = random(count)?;
+    let fine = [
+        random("acids, ammonia, silver and lime", count, Chemistry::bench(), &ACIDS)?,
+        random("half-cells", count / 10, Chemistry::half_cells(), &HALF_CELLS)?,
+    ];
     sizes()?;
     titration()?;
-    if fine { Ok(()) } else { Err("a mixture has no solution, or one that is off".into()) }
+    if fine == [true; 2] { Ok(()) } else { Err("a mixture has no solution, or one that is off".into()) }
 }
 
 /// One of every second mixture has something of each kind; sizes and shares go over many orders.
@@ -34,7 +45,7 @@ fn mixture(seed: u64, (system, blank): &(System, Vec<f64>)) -> Vec<f64> {
     let size = 10f64.powf(draw.between(-9.0, 3.0));
     let share = draw.between(0.2, 0.9);
     for i in 1..system.members().len() {
-        if draw.share() < share {
+        if system.members()[i].phase != Phase::Formal && draw.share() < share {
             args[layout.amount(i)] = size * 10f64.powf(draw.between(-9.0, -0.5));
         }
     }
@@ -47,8 +58,8 @@ fn mixture(seed: u64, (system, blank): &(System, Vec<f64>)) -> Vec<f64> {
 }
 
 /// Solves random mixtures; whether all are met.
-fn random(count: u64) -> Result<bool, String> {
-    let ready = Chemistry::bench().ready()?;
+fn random(of: &str, count: u64, chemistry: Chemistry, bounds: &Bounds) -> Result<bool, String> {
+    let ready = chemistry.ready()?;
     let elements = judge::elements(&ready.0);
     let mut worst = [(0.0, 0); 3];
     let mut failed = Vec::new();
@@ -64,7 +75,7 @@ fn random(count: u64) -> Result<bool, String> {
             }
         }
     }
-    println!("{count} random mixtures of {} species, 1e-9 to 1e3 mol", ready.0.members().len());
+    println!("{count} random mixtures of {} species, 1e-9 to 1e3 mol: {of}", ready.0.members().len());
     println!("  without a solution        {}", failed.len());
     if let Some(first) = failed.first() {
         println!("  the first of them         {first}");
@@ -72,7 +83,8 @@ fn random(count: u64) -> Result<bool, String> {
     for (name, (gap, seed)) in ["equations, worst", "atoms, worst", "charge, worst"].iter().zip(worst) {
         println!("  {name:25} {gap:.1e} (mixture {seed})");
     }
-    Ok(failed.is_empty() && worst[0].0 <= EQUATIONS && worst[1].0 <= KEPT && worst[2].0 <= KEPT)
+    let few = 100 * failed.len() as u64 <= bounds.failed * count;
+    Ok(few && worst[0].0 <= bounds.equations && worst[1].0 <= bounds.kept && worst[2].0 <= bounds.kept)
 }
 
 /// How long it takes on average, s.

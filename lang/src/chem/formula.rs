@@ -50,6 +50,9 @@ pub enum FormulaErrorKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoMolarMass(pub Element);
 
+/// The electron, which has no atoms.
+const ELECTRON_NAME: &str = "e-";
+
 /// Relative mass of the electron (CODATA 2018).
 const ELECTRON: f64 = 5.48579909065e-4;
 const MAX_DEPTH: usize = 64;
@@ -58,6 +61,9 @@ const MAX_COUNT: i64 = 1_000_000;
 impl Formula {
     /// Reads a formula with an optional charge.
     pub fn parse(text: &str) -> Result<Formula, FormulaError> {
+        if text == ELECTRON_NAME {
+            return Ok(Formula { charge: -1, ..Formula::default() });
+        }
         let (body, charge) = split_charge(text);
         let mut formula = Parser { text: body, at: 0 }.formula()?;
         formula.charge = charge;
@@ -78,6 +84,11 @@ impl Formula {
             total += element.molar_mass().ok_or(NoMolarMass(*element))? * count.to_f64();
         }
         Ok(total)
+    }
+
+    /// Whether it is the electron of half-cells.
+    pub fn is_electron(&self) -> bool {
+        self.elements.is_empty() && self.charge == -1
     }
 
     /// Atoms of an element; zero where there are none.

@@ -10,13 +10,16 @@ use crate::ast::{Field, ItemKind};
 use crate::names::{Names, used};
 
 /// The fields of which each gives the constant of an equilibrium.
-pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", ANALYTIC];
+pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC];
+
+/// The field that gives the standard potential of a half-cell.
+pub const POTENTIAL: &str = "potential";
 
 /// The field that gives the constant at every temperature.
 pub const ANALYTIC: &str = "analytic";
 
 const FIELDS: &[&str] =
-    &["constant", "log_constant", "pka", "ksp", "pksp", ANALYTIC, "at", "enthalpy", "valid", "source"];
+    &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC, "at", "enthalpy", "valid", "source"];
 
 /// An equilibrium whose species are all known.
 #[derive(Clone, Debug)]
@@ -100,7 +103,9 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
                 format!("`{name}` has no constant"),
                 "where it lies is unknown",
             )
-            .help("add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10` or `pksp: 9.75`"),
+            .help(
+                "add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10`, `pksp: 9.75`, or `potential: 0.77 V` for a half-cell",
+            ),
         ),
         (Some(first), Some(second)) => diagnostics.push(
             Diagnostic::error(
@@ -143,6 +148,15 @@ fn check_form(
             let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "does not give off one H+");
             let d = d.because(f.key.span, "the pKa stands here");
             diagnostics.push(d.help("write the equation of the acid, or give `log_constant` for this one"));
+        }
+    }
+    if let Some(f) = field(fields, POTENTIAL) {
+        let electrons = |side: &[(SpeciesId, f64)]| side.iter().any(|(s, _)| species.get(*s).is_electron);
+        if !electrons(left) || electrons(right) {
+            let headline = "a potential is that of a half-cell which takes up electrons: `Fe3+ + e- <-> Fe2+`";
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "no electrons on its left side");
+            let d = d.because(f.key.span, "the potential stands here");
+            diagnostics.push(d.help("write it as a reduction, with `e-` on the left"));
         }
     }
     let is_one_solid = dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || *n == 1.0);

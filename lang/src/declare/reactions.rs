@@ -33,6 +33,13 @@ pub fn collect<'a>(
             continue;
         };
         let equation = equation(name, reactants, products);
+        if left.iter().chain(&right).any(|(s, _)| species.get(*s).is_electron) {
+            let headline = format!("`{}` names the electron, of which there is never any", name.text);
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "`e-` stands in half-cells");
+            diagnostics
+                .push(d.help("write the whole reaction, or an equilibrium: `equilibrium iron: Fe3+ + e- <-> Fe2+`"));
+            continue;
+        }
         check_balance(species, &left, &right, equation, &name.text, diagnostics);
         check_template(species, &left, &right, fields, diagnostics);
         let terms = |list: &[Term], ids: &[(super::SpeciesId, f64)]| -> Vec<_> {

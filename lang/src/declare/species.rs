@@ -24,6 +24,8 @@ pub struct SpeciesDef<'a> {
     pub formula: Option<Formula>,
     /// Whether it is what `dissolves` is about.
     pub is_water: bool,
+    /// Whether it is the electron of half-cells, of which there is never any.
+    pub is_electron: bool,
     /// Its structure, where one is declared.
     pub structure: Option<Structure>,
     /// kg/mol; 1 for a species counted by mass.
@@ -274,12 +276,14 @@ fn species<'a>(
         None => 1.0,
     };
     let is_water = formula.as_ref().is_some_and(|formula| formula.to_string() == "H2O");
+    let is_electron = formula.as_ref().is_some_and(Formula::is_electron);
     SpeciesDef {
         decl,
         name: name.text.clone(),
         module,
         formula,
         is_water,
+        is_electron,
         structure,
         molar_mass,
         by_mass,

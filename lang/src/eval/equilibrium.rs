@@ -11,7 +11,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
-use crate::declare::equilibria::{ANALYTIC, CONSTANTS};
+use crate::declare::equilibria::{ANALYTIC, CONSTANTS, POTENTIAL};
 use crate::declare::species::field;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::{Elaborator, Mode};
@@ -21,6 +21,9 @@ use crate::units::Dimension;
 
 /// Gas constant, J/(mol*K).
 const GAS: f64 = 8.314_462_618_153_24;
+
+/// Charge of a mole of electrons, C/mol (CODATA 2018).
+const FARADAY: f64 = 96_485.332_123_310_02;
 
 const LN_10: f64 = std::f64::consts::LN_10;
 
@@ -105,7 +108,9 @@ impl<'a> Elaborator<'a> {
     fn make_speciation(&mut self, id: InstanceId, temperature: Option<NodeId>) -> Option<Speciation> {
         let here: BTreeMap<SpeciesId, u32> = self.amounts_in(id).collect();
         let equilibria: Vec<usize> = (0..self.tables.equilibria.len())
-            .filter(|e| self.tables.equilibria[*e].terms.iter().all(|(s, _)| here.contains_key(s)))
+            .filter(|e| {
+                self.tables.equilibria[*e].terms.iter().all(|(s, _)| here.contains_key(s) || self.is_formal(*s))
+            })
             .collect();
         let water = here.keys().copied().find(|s| self.tables.species.get(*s).is_water)?;
         let mut members = vec![water];
@@ -122,6 +127,10 @@ impl<'a> Elaborator<'a> {
         let system = self.system_of(&members, &equilibria)?;
         let args = self.numbers_of(id, &members, &equilibria, &system, temperature)?;
         Some(Speciation { system, members, equilibria, args })
+    }
+
+    fn is_formal(&self, s: SpeciesId) -> bool {
+        self.tables.species.get(s).is_electron
     }
 
     /// The system of some equilibria; made once for all mixtures that have the same.
@@ -143,6 +152,7 @@ impl<'a> Elaborator<'a> {
             let phase = match (def.is_water, is_solid(s)) {
                 (true, _) => Phase::Solvent,
                 (_, true) => Phase::Solid,
+                _ if def.is_electron => Phase::Formal,
                 _ => Phase::Solute,
             };
             let charge = def.formula.as_ref().map_or(0.0, |f| f64::from(f.charge));
@@ -319,9 +329,16 @@ impl<'a> Elaborator<'a> {
             return self.analytic(given, module);
         }
         let v = self.expr(given, &mut Scope::module(module));
-        let Value::Num(n) = self.coerce(v, &Type::ratio(), given.span, key) else { return None };
+        let ty = if key == POTENTIAL { self.voltage() } else { Type::ratio() };
+        let Value::Num(n) = self.coerce(v, &ty, given.span, key) else { return None };
         let n = self.name_param(&format!("{name}.{key}"), n, given.span);
         let ln_k = match key {
+            POTENTIAL => {
+                // The law of Nernst: R T ln K = n F E.
+                let at = self.given_at(e)?;
+                let charge = self.multiple(self.electrons_of(e) * FARADAY / GAS, n.node);
+                self.graph.binary(BinaryOp::Div, charge, at)
+            }
             "constant" | "ksp" => {
                 let node = self.graph.unary(UnaryOp::Ln, n.node);
                 self.note_place(node, given.span);
@@ -374,6 +391,16 @@ impl<'a> Elaborator<'a> {
     fn multiple(&mut self, factor: f64, node: NodeId) -> NodeId {
         let factor = self.graph.number(factor);
         self.graph.binary(BinaryOp::Mul, factor, node)
+    }
+
+    fn voltage(&self) -> Type {
+        Type::Quantity { dimension: self.tables.units.named("Voltage"), point: false, optional: false }
+    }
+
+    /// How many electrons a half-cell takes up.
+    fn electrons_of(&self, e: usize) -> f64 {
+        let terms = &self.tables.equilibria[e].terms;
+        -terms.iter().filter(|(s, _)| self.is_formal(*s)).map(|(_, n)| n).sum::<f64>()
     }
 
     fn enthalpy_of(&mut self, e: usize) -> Option<NodeId> {

@@ -5,6 +5,9 @@ use super::{Phase, Written};
 /// Below this a coefficient is what rounding left.
 const NOTHING: f64 = 1e-9;
 
+/// A member that is made of more than so many of one master makes totals turn over at once.
+const STEEP: f64 = 4.0;
+
 /// Equations that cancel: the sum of their logarithms of constants, each by its factor, is 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Circle {
@@ -76,12 +79,16 @@ pub(super) struct Basis {
     pub(super) solutes: Vec<usize>,
     /// Solids.
     pub(super) solids: Vec<usize>,
+    /// Formal members.
+    pub(super) formal: Vec<usize>,
     /// Solids that are there, by member: masters of their own, with an activity of 1.
     pub(super) held: Vec<usize>,
     /// By member: how much of each of these.
     pub(super) of_held: Vec<Vec<f64>>,
     /// By master: whether no member takes any of it away, so that its total is at least 0.
     pub(super) is_matter: Vec<bool>,
+    /// Whether a member is made of many of one master.
+    pub(super) is_steep: bool,
     /// Equations that follow from others.
     pub(super) circles: Vec<Circle>,
 }
@@ -114,7 +121,8 @@ impl Basis {
         let water = water.ok_or_else(|| Unsettled("there is no solvent".into()))?;
         let (rows, circles) = reduced(written)?;
         let formed: Vec<usize> = rows.iter().map(|(pivot, _)| *pivot).collect();
-        let is_master = |i: &usize| phase(*i) == Phase::Solute && !formed.contains(i);
+        let is_dissolved = |i: usize| matches!(phase(i), Phase::Solute | Phase::Formal);
+        let is_master = |i: &usize| is_dissolved(*i) && !formed.contains(i);
         let masters: Vec<usize> = (0..count).filter(is_master).collect();
         let mut of = vec![vec![0.0; masters.len()]; count];
         let (mut solvent, mut by) = (vec![0.0; count], vec![Vec::new(); count]);
@@ -126,7 +134,7 @@ impl Basis {
             by[pivot] = row.equations.into_iter().enumerate().filter(|(_, by)| by.abs() > NOTHING).collect();
         }
         let with = |wanted: Phase| (0..count).filter(|i| phase(*i) == wanted).collect();
-        let (solutes, solids) = (with(Phase::Solute), with(Phase::Solid));
+        let (solutes, solids, formal) = (with(Phase::Solute), with(Phase::Solid), with(Phase::Formal));
         let (held, of_held) = (Vec::new(), vec![Vec::new(); count]);
         let charges = written.members.iter().map(|m| m.charge).collect();
         let basis = Basis {
@@ -137,6 +145,7 @@ impl Basis {
             water,
             solutes,
             solids,
+            formal,
             held,
             of_held,
             circles,
@@ -150,6 +159,7 @@ impl Basis {
     fn complete(mut self) -> Basis {
         self.masters_of = self.of.iter().map(|of| of.iter()).collect();
         self.parts = self.of.iter().zip(&self.solvent).map(|(of, solvent)| of.iter().chain([solvent])).collect();
+        self.is_steep = self.masters_of.rows().flatten().any(|(_, part)| part.abs() > STEEP);
         self.is_matter = (0..self.masters.len()).map(|c| self.of.iter().all(|of| of[c] >= 0.0)).collect();
         self
     }
@@ -251,7 +261,8 @@ fn reduced(written: &Written) -> Result<Reduced, Unsettled> {
 /// which stands alone on its side, so that totals of the rest count up.
 fn pivot(written: &Written, row: &Row) -> Option<usize> {
     let phase = |i: usize| written.members[i].phase;
-    let is_there = |i: &usize| row.members[*i] != 0.0 && phase(*i) != Phase::Solvent;
+    let is_matter = |i: usize| matches!(phase(i), Phase::Solute | Phase::Solid);
+    let is_there = |i: &usize| row.members[*i] != 0.0 && is_matter(*i);
     let beside = |i: usize| {
         let same = |j: &usize| is_there(j) && phase(*j) == Phase::Solute && row.members[*j] * row.members[i] > 0.0;
         (0..row.members.len()).filter(same).count()

@@ -12,6 +12,7 @@
 mod activity;
 mod basis;
 mod bounds;
+mod formal;
 mod linear;
 mod memo;
 mod newton;
@@ -41,6 +42,8 @@ pub enum Phase {
     Solute,
     /// A pure solid: its activity is 1 where there is some of it.
     Solid,
+    /// A formal one, as the electron of half-cells is: it has an activity, but there is never any of it.
+    Formal,
 }
 
 /// One of the species of a system.
@@ -80,6 +83,7 @@ pub struct Written {
 pub struct System {
     written: Written,
     basis: Arc<Basis>,
+    rest: Option<formal::Rest>,
     fingerprint: u64,
 }
 
@@ -95,7 +99,8 @@ impl TryFrom<Written> for System {
     fn try_from(written: Written) -> Result<Self, Unsettled> {
         let basis = Arc::new(Basis::new(&written)?);
         let fingerprint = memo::fingerprint(&written);
-        Ok(System { written, basis, fingerprint })
+        let rest = formal::Rest::of(&written);
+        Ok(System { written, basis, rest, fingerprint })
     }
 }
 

@@ -25,6 +25,9 @@ const MOST_STEPS: usize = 200;
 const FAR: f64 = 8.0;
 const MOST_FRACTIONS: usize = 100;
 
+/// The largest logarithm of a total over what it should be that is gone in one step.
+const BEYOND: f64 = 500.0;
+
 /// From here on activity coefficients move with the rest, unless that has led nowhere for so many steps.
 const NEAR: f64 = 1.0;
 const PATIENCE: usize = 6;
@@ -48,13 +51,26 @@ struct Best {
 impl Problem<'_> {
     /// Newton's method; the unknowns and what follows from them. Far from the solution activity coefficients stay as they are while the
     /// rest moves, and then follow: what they would be along the way is of no use.
-    pub(super) fn newton(&self, mut x: Vec<f64>, totals: &Totals) -> Option<(Vec<f64>, State)> {
-        let places = self.places();
+    pub(super) fn newton(&self, x: Vec<f64>, totals: &Totals) -> Option<(Vec<f64>, State)> {
         let mut state = State::default();
         self.evaluate(&x, totals, &mut state);
-        if largest(&state.residuals[..self.basis.masters.len()]) > FAR {
-            self.approach(&mut x, totals, &mut state);
+        if largest(&state.residuals[..self.basis.masters.len()]) <= FAR {
+            return self.refine(x, totals, state);
         }
+        let near = |one_by_one: bool| {
+            let (mut x, mut state) = (x.clone(), state.clone());
+            match one_by_one {
+                true => self.approach_one_by_one(&mut x, totals, &mut state),
+                false => self.approach(&mut x, totals, &mut state),
+            }
+            self.refine(x, totals, state)
+        };
+        near(self.basis.is_steep).or_else(|| near(!self.basis.is_steep))
+    }
+
+    /// Newton's method from a point that is not far off.
+    fn refine(&self, mut x: Vec<f64>, totals: &Totals, mut state: State) -> Option<(Vec<f64>, State)> {
+        let places = self.places();
         let mut best = Best { off: f64::INFINITY, x: Vec::new(), state: State::default() };
         let mut idle = 0;
         let (mut factors, mut right, mut step) = (Factors::default(), Vec::new(), Vec::new());
@@ -131,6 +147,31 @@ impl Problem<'_> {
         }
     }
 
+    /// The same where members hold many of a master: the total that takes the longest way goes first, by itself, along the member
+    /// that makes up most of it.
+    fn approach_one_by_one(&self, x: &mut [f64], totals: &Totals, state: &mut State) {
+        let masters = self.basis.masters.len();
+        for _ in 0..MOST_FRACTIONS + 4 * masters {
+            let way = |c: usize| {
+                let [sum, wanted] = state.sides[c];
+                // What is beyond all numbers is brought back by and by.
+                math::ln(wanted / sum).clamp(-BEYOND, BEYOND) / self.most_part(c, state)
+            };
+            let furthest = (0..masters).map(|c| (c, way(c))).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+            let Some((c, way)) = furthest.filter(|(_, way)| way.abs() > NEAR) else { return };
+            x[c] += way;
+            self.evaluate(x, totals, state);
+        }
+    }
+
+    /// How much of a master that member has which makes up most of its total.
+    fn most_part(&self, c: usize, state: &State) -> f64 {
+        let of = |i: usize| self.basis.of[i][c];
+        let held = |i: &usize| of(*i) * state.amounts[*i];
+        let adds = (0..self.basis.of.len()).filter(|i| of(*i) > 0.0);
+        adds.max_by(|a, b| held(a).total_cmp(&held(b))).map_or(1.0, of)
+    }
+
     /// The least of a master that a member has.
     fn least_part(&self, c: usize) -> f64 {
         let parts = self.basis.of.iter().map(|of| of[c]).filter(|part| *part > 0.0);
@@ -154,5 +195,6 @@ impl Problem<'_> {
 
 /// The largest magnitude; not a number where one is none.
 fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0_f64, |most, v| if v.is_nan() { f64::NAN } else { most.max(v.abs()) })
+    let nan_or = |most: f64, v: f64| if most.is_nan() || v.is_nan() { f64::NAN } else { most.max(v) };
+    values.iter().map(|v| v.abs()).fold(0.0, nan_or)
 }

@@ -63,17 +63,20 @@ impl Places {
 }
 
 /// A system with its arguments, seen by a basis.
+#[derive(Clone)]
 pub(super) struct Problem<'a> {
     pub(super) system: &'a System,
     pub(super) args: &'a [f64],
     pub(super) layout: Layout,
     pub(super) activities: Activities,
     pub(super) basis: Arc<Basis>,
+    /// The logarithm of the activity of a formal member that is held.
+    pub(super) limit: f64,
 }
 
 impl<'a> Problem<'a> {
     pub(super) fn new(system: &'a System, args: &'a [f64], basis: Arc<Basis>) -> Self {
-        Problem { system, args, layout: system.layout(), activities: Activities::of(args), basis }
+        Problem { system, args, layout: system.layout(), activities: Activities::of(args), basis, limit: 0.0 }
     }
 
     pub(super) fn places(&self) -> Places {

@@ -7,10 +7,11 @@
 use std::sync::Arc;
 
 use super::basis::Basis;
+use super::formal::Begin;
 use super::linear::{Factors, Matrix};
 use super::problem::{Problem, TEMPERATURES, Totals};
 use super::state::State;
-use super::{Layout, System, memo};
+use super::{Layout, System, formal, memo};
 use crate::math;
 
 /// ln 10.
@@ -88,6 +89,14 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
         }
     }
     let start = free.start(&totals);
+    let found = match formal::bracketed(&free) {
+        Some(Begin::Near(start, held)) => follow(&free, &start, &lacking, held),
+        Some(Begin::AtLimit(start, held, limit)) => follow(&Problem { limit, ..free.clone() }, &start, &lacking, held),
+        None => None,
+    };
+    if found.is_some() {
+        return found;
+    }
     let found = follow(&free, &start, &lacking, given);
     let found = found.or_else(|| follow(&free, &start, &lacking, Vec::new()));
     found.or_else(|| by_temperature(&free, start, &lacking))
@@ -135,13 +144,14 @@ fn follow(free: &Problem<'_>, start: &[f64], lacking: &[f64], mut held: Vec<usiz
     let mut others = start[system.basis.masters.len()..].to_vec();
     for _ in 0..4 * solids.len() + 4 {
         let seek = |replaced: &[usize]| {
-            let problem = Problem::new(system, args, memo::basis(system, &held, replaced)?);
+            let basis = memo::basis(system, &held, replaced)?;
+            let problem = Problem { limit: free.limit, ..Problem::new(system, args, basis) };
             let totals = problem.totals(lacking);
             let begin = problem.basis.masters.iter().map(|i| known[*i]).chain(others.iter().copied()).collect();
             problem.newton(begin, &totals).map(|(x, state)| (problem, totals, x, state))
         };
         let (problem, totals, x, state) = seek(&free.scarcest(&held))?;
-        for &i in &problem.basis.solutes {
+        for &i in problem.basis.solutes.iter().chain(&problem.basis.formal) {
             known[i] = problem.activity(i, &state, &x);
         }
         others = x[problem.basis.masters.len()..].to_vec();
@@ -190,7 +200,7 @@ fn finish(
 ) -> Option<Solution> {
     let (basis, places) = (problem.basis.clone(), problem.places());
     let mut activities = vec![0.0; basis.of.len()];
-    for i in basis.solutes.iter().chain(&basis.solids).chain([&basis.water]) {
+    for i in basis.solutes.iter().chain(&basis.solids).chain(&basis.formal).chain([&basis.water]) {
         activities[*i] = problem.activity(*i, &state, &x);
     }
     let mut amounts = state.amounts.clone();

@@ -104,6 +104,9 @@ impl Problem<'_> {
             to.extend(basis.by.iter().map(|by| sum(by, which)));
         };
         all(0, &mut state.constants);
+        if let Some(k) = basis.held.iter().position(|i| basis.formal.contains(i)) {
+            state.constants.iter_mut().zip(&basis.of_held).for_each(|(constant, of)| *constant += of[k] * self.limit);
+        }
         all(1, &mut state.rises);
         all(2, &mut state.enthalpies);
         let capacity = |i: usize| self.args[layout.capacity_of(i)];
@@ -234,7 +237,7 @@ impl Problem<'_> {
         let amount = state.amounts[member];
         match self.system.members()[member].phase {
             Phase::Solvent => amount * step[places.solvent()],
-            Phase::Solid => 0.0,
+            Phase::Solid | Phase::Formal => 0.0,
             Phase::Solute => {
                 let formed: f64 = self.masters_of(member).iter().map(|(c, of)| of * step[*c]).sum();
                 let Coefficient { by_strength, by_warmth, .. } = state.coefficients[member];
@@ -272,7 +275,9 @@ impl Problem<'_> {
             let all = state.amounts.iter().zip(&self.basis.of_held);
             all.map(|(amount, of)| amount * of[k]).sum()
         };
-        totals.held.iter().enumerate().map(|(k, total)| total - dissolved(k)).collect()
+        let is_formal = |k: usize| self.basis.formal.contains(&self.basis.held[k]);
+        let amount = |(k, total): (usize, &f64)| if is_formal(k) { 0.0 } else { total - dissolved(k) };
+        totals.held.iter().enumerate().map(amount).collect()
     }
 }
 

@@ -24,7 +24,11 @@ impl Sketch {
         if let Some(known) = self.written.members.iter().position(|m| m.name == name) {
             return known;
         }
-        let phase = if name.ends_with("(s)") { Phase::Solid } else { Phase::Solute };
+        let phase = match name {
+            "e-" => Phase::Formal,
+            name if name.ends_with("(s)") => Phase::Solid,
+            _ => Phase::Solute,
+        };
         let signs = |sign: char| name.chars().rev().take_while(|c| *c == sign).count() as f64;
         let charge = signs('+') - signs('-');
         self.written.members.push(Member { name: name.into(), phase, charge });
@@ -281,6 +285,63 @@ fn ions_of_several_atoms_are_solved() {
         let of = |k: u32| 10f64.powf(-7.0 + 6.0 * f64::from((seed * 37 + k * 101) % 113) / 113.0);
         let all = [("water", WATER), ("Pb++", of(1)), ("Cl-", of(2)), ("OH-", of(3)), ("H+", of(4))];
         assert!(lead().build().real().with(&all).ph().is_finite(), "{seed}");
+    }
+}
+
+/// Half-cells, with log10 K from potentials in V.
+fn half_cells() -> Sketch {
+    let log = |electrons: f64, potential: f64| electrons * potential / 0.059_159_6;
+    Sketch::new()
+        .equation("-1 water 1 H+ 1 OH-", -14.0, 55.8)
+        .equation("-1 Fe+++ -1 e- 1 Fe++", log(1.0, 0.771), 0.0)
+        .equation("-1 Ce++++ -1 e- 1 Ce+++", log(1.0, 1.72), 0.0)
+        .equation("-1 MnO4- -8 H+ -5 e- 1 Mn++ 4 water", log(5.0, 1.507), 0.0)
+        .equation("-1 Cu++ -2 e- 1 Cu(s)", log(2.0, 0.3419), 0.0)
+        .equation("-1 Zn++ -2 e- 1 Zn(s)", log(2.0, -0.7618), 0.0)
+}
+
+fn potential(all: &[(&str, f64)]) -> f64 {
+    let mixture = half_cells().build().with(&[("water", WATER), ("H+", 1.0)]).with(all);
+    -mixture.system.value(Part::Activity(mixture.find("e-")), &mixture.args) / LN_10 * 0.059_159_6
+}
+
+#[test]
+fn potentials_follow_the_law_of_nernst() {
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-4, "{found} is not {expected}");
+    near(potential(&[("Fe+++", 0.1), ("Fe++", 0.1)]), 0.771);
+    near(potential(&[("Fe+++", 0.1), ("Fe++", 1e-3)]), 0.771 + 2.0 * 0.059_16);
+    near(potential(&[("Cu++", 1e-2), ("Cu(s)", 1.0)]), 0.3419 - 0.059_16);
+    near(potential(&[("MnO4-", 1e-2), ("Mn++", 1e-2)]), 1.507);
+}
+
+#[test]
+fn a_redox_titration_passes_its_end_point() {
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 2e-4, "{found} is not {expected}");
+    near(potential(&[("Fe++", 0.1), ("Ce++++", 0.05)]), 0.771);
+    near(potential(&[("Fe++", 0.1), ("Ce++++", 0.1)]), 0.5 * (0.771 + 1.72));
+    near(potential(&[("Fe++", 0.1), ("Ce++++", 0.2)]), 1.72);
+    // Permanganate takes up five electrons and eight protons.
+    let before = half_cells().build().with(&[("water", WATER), ("H+", 1.0), ("Fe++", 0.1), ("MnO4-", 0.01)]);
+    assert!((before.amount("Fe+++") - 0.05).abs() < 1e-9, "{}", before.amount("Fe+++"));
+    assert!((before.amount("H+") - 0.92).abs() < 1e-9, "{}", before.amount("H+"));
+    assert_eq!(before.amount("e-"), 0.0);
+    // The potential at the end point lies between the two by the electrons that each takes.
+    let end = half_cells().build().with(&[("water", WATER), ("H+", 1.16), ("Fe++", 0.1), ("MnO4-", 0.02)]);
+    let at = -end.system.value(Part::Activity(end.find("e-")), &end.args) / LN_10 * 0.059_159_6;
+    near(at, (0.771 + 5.0 * 1.507) / 6.0);
+}
+
+#[test]
+fn metals_plate_out_and_dissolve() {
+    let mixture = half_cells().build().with(&[("water", WATER), ("Cu++", 0.1), ("Zn(s)", 0.3)]);
+    assert!((mixture.amount("Cu(s)") - 0.1).abs() < 1e-9, "{}", mixture.amount("Cu(s)"));
+    assert!((mixture.amount("Zn(s)") - 0.2).abs() < 1e-9, "{}", mixture.amount("Zn(s)"));
+    assert!((mixture.amount("Zn++") - 0.1).abs() < 1e-9, "{}", mixture.amount("Zn++"));
+    for seed in 0..300_u32 {
+        let of = |k: u32| 10f64.powf(-9.0 + 8.0 * f64::from((seed * 37 + k * 101) % 113) / 113.0);
+        let all =
+            [("Fe+++", of(1)), ("Fe++", of(2)), ("Ce++++", of(3)), ("MnO4-", of(4)), ("Cu++", of(5)), ("Zn(s)", of(6))];
+        assert!(potential(&all).is_finite(), "{seed}");
     }
 }
 

@@ -162,6 +162,7 @@ fn origins(lab: &Elaborator<'_>) -> BTreeMap<InstanceId, BTreeSet<String>> {
 
 /// Adds what the species can turn into.
 fn close(set: &mut BTreeSet<SpeciesId>, tables: &Tables<'_>) {
+    let is_formal = |s: &SpeciesId| tables.species.get(*s).is_electron;
     loop {
         let before = set.len();
         let ions: Vec<_> = set.iter().flat_map(|s| tables.species.get(*s).dissolves.iter().map(|d| d.0)).collect();
@@ -174,11 +175,11 @@ fn close(set: &mut BTreeSet<SpeciesId>, tables: &Tables<'_>) {
         for e in &tables.equilibria {
             let is_there = |left: bool| {
                 let mut side = e.terms.iter().filter(|(_, n)| (*n < 0.0) == left);
-                side.all(|(s, _)| set.contains(s) || tables.species.get(*s).is_water)
+                side.all(|(s, _)| set.contains(s) || tables.species.get(*s).is_water || is_formal(s))
             };
             let is_wet = e.terms.iter().all(|(s, _)| !tables.species.get(*s).is_water || set.contains(s));
             if is_wet && (is_there(true) || is_there(false)) {
-                set.extend(e.terms.iter().map(|t| t.0));
+                set.extend(e.terms.iter().map(|t| t.0).filter(|s| !is_formal(s)));
             }
         }
         if set.len() == before {
