@@ -552,7 +552,7 @@ def main():
                     ratio = got[0] / by_atoms(mol, mass)
                     melts = choose("melting_point", found["melting_point"])
                     warm = melts is not None and melts[0] < 313.15
-                    if ratio < (0.93 if warm else 1.0) or got[3] is None and not 1.03 <= ratio <= 1.3:
+                    if ratio < (0.93 if warm else 1.0) or got[3] is None and not warm and not (1.03 if got[1] == "obg" else 1.1) <= ratio <= 1.3:
                         say(f"density {got[0]:.4g} of {got[1]} and {got[3]} is that of a melt, or wrong")
                         got = None
             if got and what == "flash_point" and (phase == "gas" or got[3] is None and got[1] not in ("iec", "nfp")):
@@ -562,6 +562,9 @@ def main():
                 # Some have no melting point below 1 atm: they sublime.
                 boils = choose("boiling_point", found["boiling_point"])
                 fits["gas"] = lambda t: boils is not None and t < boils[0]
+            if got and what == "melting_point" and got[3] is None and got[0] > 1500:
+                # Whether it melts at all, or sublimes, is not sure then.
+                got = None
             if got and what == "melting_point" and not fits[phase](got[0]):
                 say(f"melting point {got[0]:.5g} of {got[1]} is not that of a {phase}")
                 got = None

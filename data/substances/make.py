@@ -146,6 +146,7 @@ def substances():
         second = float(row["second"]) if row["second"] else None
         values.setdefault(row["name"], {})[row["property"]] = Row(row["property"], float(row["value"]), row["source"], second)
     taken = set(re.findall(r"^species (\S+) ", SPECIES.read_text(encoding="utf-8"), re.M))
+    explained = (HERE / "head.mtx").read_text(encoding="utf-8")
     weigh, wrong, seen, out, dropped = masses(), [], {}, [], []
     for row in listed:
         name, ids, by = row["name"], known.get(row["name"]), values.get(row["name"], {})
@@ -161,6 +162,9 @@ def substances():
         say = lambda text: wrong.append(f"{name}: {text}")
         for text in faults_of(ids, by, mass):
             say(text)
+        for stated in by.values():
+            if f"`[{stated.source}]`" not in explained:
+                say(f"head.mtx does not explain `[{stated.source}]`")
         if not check_digit(row["cas"]):
             say("the check digit of its CAS number is wrong")
         for key in {row["cas"], ids["inchikey"], ids["smiles"]} - {""}:
@@ -185,7 +189,8 @@ def entry(row, ids, by):
     """The text of a substance with its other names."""
     out = f"/// {row['title']}.\nspecies {row['name']} {{\n"
     if ids["smiles"]:
-        out += f'    smiles: "{ids["smiles"]}"\n'
+        smiles = ids["smiles"].replace("\\", "\\\\")
+        out += f'    smiles: "{smiles}"\n'
     out += f'    formula: "{ids["formula"]}"\n    cas: "{row["cas"]}"\n    phase: "{ids["phase"]}"\n'
     out += "".join(by[what].line() for what in ORDER if what in by)
     if row["groups"]:
