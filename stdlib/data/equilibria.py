@@ -4,7 +4,7 @@
 
 `species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source.
 `modules.csv` says which modules there are and what they use; `sources.csv` what each tag stands for; `modules/NAME.md` is the page of each
-module. With `--check` nothing is written: the exit code is 1 where a module differs from its tables, where an equation does not balance or
+module, `modules/NAME.mtx` what else stands in it. With `--check` nothing is written: the exit code is 1 where a module differs from its tables, where an equation does not balance or
 an equilibrium says what others say already. With `--report` it prints which constants have one source only, and where two differ by more
 than 0.1 in log10 K or 3 kJ/mol.
 """
@@ -242,7 +242,9 @@ def module(entry, all_species, all_equilibria, sources):
         first, *rest = wrapped(f"- `[{row['tag']}]` {row['says']}")
         head += [f"//! {first}"] + [f"//!   {line}" for line in rest]
     uses = [f"use std::{used}" for used in entry["uses"].split()]
-    return "\n".join(head + ([""] + uses if uses else []) + [""] + body).rstrip() + "\n"
+    tail = HERE / "modules" / f"{name}.mtx"
+    written = "\n".join(head + ([""] + uses if uses else []) + [""] + body).rstrip() + "\n"
+    return written + ("\n" + tail.read_text(encoding="utf8") if tail.exists() else "")
 
 
 def rank(rows):
