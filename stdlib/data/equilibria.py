@@ -4,8 +4,9 @@
 
 `species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source.
 `modules.csv` says which modules there are and what they use; `sources.csv` what each tag stands for; `modules/NAME.md` is the page of each
-module, `modules/NAME.mtx` what else stands in it. With `--check` nothing is written: the exit code is 1 where a module differs from its tables, where an equation does not balance or
-an equilibrium says what others say already. With `--report` it prints which constants have one source only, and where two differ by more
+module, `modules/NAME.mtx` what else stands in it. The sections of docs/library.md on them are written too. With `--check` nothing is
+written: the exit code is 1 where a module differs from its tables, where an equation does not balance or an equilibrium says what others say
+already. With `--report` it prints which constants have one source only, and where two differ by more
 than 0.1 in log10 K or 3 kJ/mol.
 """
 
@@ -247,6 +248,48 @@ def module(entry, all_species, all_equilibria, sources):
     return written + ("\n" + tail.read_text(encoding="utf8") if tail.exists() else "")
 
 
+def listed(names):
+    """Names in lines of a page."""
+    return "\n".join(wrapped(", ".join(f"`{name}`" for name in names)))
+
+
+def section(entry, all_species, all_equilibria):
+    """What docs/library.md says of a module."""
+    name = entry["module"]
+    own = [row for row in all_species if row["module"] == name]
+    rules = [row for row in all_equilibria if row["module"] == name]
+    says = (HERE / "modules" / f"{name}.md").read_text(encoding="utf8").split("\n\n")[0].replace("\n", " ").strip()
+    lines = [f"## `std::{name}`", "", re.sub(r"\((\w+)\.mtx\)", r"(library/\1.md)", says), ""]
+    for title, rows in sections(own).items():
+        lines += [f"{title[0].upper()}{title[1:]}:", "", listed(row["name"] for row in rows), ""]
+    tail = HERE / "modules" / f"{name}.mtx"
+    if tail.exists():
+        found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)", tail.read_text(encoding="utf8"), re.M)
+        lines += ["| name | is |", "| --- | --- |"]
+        lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}` | {doc} |" for doc, kind, word in found] + [""]
+    if name != "equilibria":
+        return "\n".join(lines + ([f"Equilibria ({len(rules)}):", "", listed(row["name"] for row in rules), ""] if rules else []))
+    lines += ["| equilibrium | constant at 25 °C | enthalpy, kJ/mol | source |", "| --- | --- | --- | --- |"]
+    words = {"pka": "pKa", "pksp": "pKsp", "log_constant": "log10 K"}
+    for row in rules:
+        moves = ", analytic" if row["analytic"] or row["capacity"] else ""
+        lines.append(f"| `{row['name']}` | {words[row['kind']]} {number(row['value'])}{moves} | {row['enthalpy']} | {row['source']} |")
+    return "\n".join(lines + [""])
+
+
+def paged(page, entries, all_species, all_equilibria):
+    """The page of the library with the sections of these modules."""
+    for before, entry in zip([{"module": "framings"}, *entries], entries):
+        text = section(entry, all_species, all_equilibria)
+        old = re.search(rf"^## `std::{entry['module']}`\n.*?(?=^## )", page, re.M | re.S)
+        if old:
+            page = page[: old.start()] + text + "\n" + page[old.end():]
+        else:
+            at = re.search(rf"^## `std::{before['module']}`\n.*?(?=^## )", page, re.M | re.S).end()
+            page = page[:at] + text + "\n" + page[at:]
+    return page
+
+
 def rank(rows):
     """The rank of a matrix by elimination."""
     rows, found = [dict(row) for row in rows], 0
@@ -311,6 +354,13 @@ def main():
                 found.append(f"{path.name} differs from its tables: run stdlib/data/equilibria.py")
         else:
             path.write_text(text, encoding="utf8")
+    path = LIBRARY.parent / "docs" / "library.md"
+    page = path.read_text(encoding="utf8")
+    text = paged(page, modules, all_species, rows)
+    if "--check" not in sys.argv:
+        path.write_text(text, encoding="utf8")
+    elif page != text:
+        found.append("docs/library.md differs from the tables: run stdlib/data/equilibria.py")
     if "--report" in sys.argv:
         report(rows)
     print("\n".join(found), end="\n" if found else "")
