@@ -40,7 +40,11 @@ fn cautions_of_acids_fall_silent_with_the_modules_that_have_them() {
         ("use std::equilibria", "100 g of water + 10 mmol of pyridine", "leaves out what pyridine does"),
         ("use std::acids", "100 g of water + 10 mmol of pyridine", ""),
         ("use std::acids", "100 g of water + 10 mmol of Et3N", ""),
-        ("use std::equilibria\nuse std::buffers", "100 g of water + 10 mmol of citric_acid_monohydrate + 5 mmol of MES", ""),
+        (
+            "use std::equilibria\nuse std::buffers",
+            "100 g of water + 10 mmol of citric_acid_monohydrate + 5 mmol of MES",
+            "",
+        ),
         ("use std::complexes", "100 g of water + 1 mmol of EDTA_disodium_dihydrate + 1 mmol of CaCO3", ""),
     ];
     for (uses, holding, why) in cases {
