@@ -4,7 +4,7 @@
 
 `species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source.
 `modules.csv` says which modules there are and what they use; `sources.csv` what each tag stands for; `modules/NAME.md` is the page of each
-module, `modules/NAME.mtx` what else stands in it. The sections of docs/library.md on them are written too. With `--check` nothing is
+module, `modules/NAME.more` what else stands in it. The sections of docs/library.md on them are written too. With `--check` nothing is
 written: the exit code is 1 where a module differs from its tables, where an equation does not balance or an equilibrium says what others say
 already. With `--report` it prints which constants have one source only, and where two differ by more
 than 0.1 in log10 K or 3 kJ/mol.
@@ -243,7 +243,7 @@ def module(entry, all_species, all_equilibria, sources):
         first, *rest = wrapped(f"- `[{row['tag']}]` {row['says']}")
         head += [f"//! {first}"] + [f"//!   {line}" for line in rest]
     uses = [f"use std::{used}" for used in entry["uses"].split()]
-    tail = HERE / "modules" / f"{name}.mtx"
+    tail = HERE / "modules" / f"{name}.more"
     written = "\n".join(head + ([""] + uses if uses else []) + [""] + body).rstrip() + "\n"
     return written + ("\n" + tail.read_text(encoding="utf8") if tail.exists() else "")
 
@@ -262,7 +262,7 @@ def section(entry, all_species, all_equilibria):
     lines = [f"## `std::{name}`", "", re.sub(r"\((\w+)\.mtx\)", r"(library/\1.md)", says), ""]
     for title, rows in sections(own).items():
         lines += [f"{title[0].upper()}{title[1:]}:", "", listed(row["name"] for row in rows), ""]
-    tail = HERE / "modules" / f"{name}.mtx"
+    tail = HERE / "modules" / f"{name}.more"
     if tail.exists():
         found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)", tail.read_text(encoding="utf8"), re.M)
         lines += ["| name | is |", "| --- | --- |"]
