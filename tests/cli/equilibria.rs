@@ -80,7 +80,7 @@ fn a_ph_that_the_equilibria_do_not_give_is_warned_of() {
     let cases = [
         (all, "100 g of water + 10 mmol of acetic_acid + 10 mmol of NaCl", ""),
         (all, salty, "an ionic strength of 1.20 mol/kg"),
-        (all, "100 g of water + 10 mmol of formic_acid", "leaves out what formic_acid does"),
+        (all, "100 g of water + 10 mmol of ascorbic_acid", "leaves out what ascorbic_acid does"),
         (WATER, "100 g of water + 10 mmol of Na2CO3", "leaves out what CO3^2- does"),
         (acid, "100 g of water + 10 mmol of acetic_acid", "leaves out that water splits"),
         (WATER, "100 g of water at 60 degC", "stands ready at 60 degC"),

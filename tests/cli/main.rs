@@ -17,6 +17,7 @@ mod doc;
 mod emit;
 mod environments;
 mod equilibria;
+mod equilibria_data;
 mod explain;
 mod faults;
 mod files;

@@ -167,13 +167,15 @@ fn check_form(
     }
 }
 
-/// The pure solids of an equation: what a solubility product is of, and what is written as one.
+/// The pure solids of an equation: what a solubility product is of, what is written as one, and solids that split into ions as soon as they
+/// dissolve, which are in no solution as they stand.
 fn solids(species: &SpeciesTable<'_>, (left, right): Sides<'_>, fields: &[Field]) -> Vec<SpeciesId> {
     let of_product = ["ksp", "pksp"].iter().any(|key| field(fields, key).is_some());
     let all = left.iter().map(|(s, _)| (*s, true)).chain(right.iter().map(|(s, _)| (*s, false)));
     let is_solid = |(s, on_left): &(SpeciesId, bool)| {
         let def = species.get(*s);
-        def.name.ends_with("(s)") || (of_product && *on_left && !def.is_water)
+        let is_salt = def.phase() == Some("solid") && !def.dissolves.is_empty();
+        def.name.ends_with("(s)") || is_salt || (of_product && *on_left && !def.is_water)
     };
     all.filter(is_solid).map(|(s, _)| s).collect()
 }

@@ -1,0 +1,371 @@
+"""Writes the modules of equilibria in stdlib/ from the tables beside this file.
+
+    equilibria.py [--check] [--report]
+
+`species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source.
+`modules.csv` says which modules there are and what they use; `sources.csv` what each tag stands for; `modules/NAME.md` is the page of each
+module, `modules/NAME.more` what else stands in it. The sections of docs/library.md on them are written too. With `--check` nothing is
+written: the exit code is 1 where a module differs from its tables, where an equation does not balance or an equilibrium says what others say
+already. With `--report` it prints which constants have one source only, and where two differ by more
+than 0.1 in log10 K or 3 kJ/mol.
+"""
+
+import csv
+import math
+import pathlib
+import re
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+LIBRARY = HERE.parent
+WIDTH = 140
+# The gas constant times ln 10, J/(mol*K), and the temperature of constants, K.
+R_LN10 = 8.314462618 * math.log(10)
+T0 = 298.15
+# Atomic masses of what solubilities are given of, g/mol (IUPAC, 2021, abridged).
+MASSES = {
+    "H": 1.008, "C": 12.011, "N": 14.007, "O": 15.999, "Na": 22.990, "Mg": 24.305, "P": 30.974, "S": 32.06, "Cl": 35.45, "K": 39.098,
+    "Fe": 55.845, "Cu": 63.546, "Zn": 65.38, "Br": 79.904, "I": 126.904, "Ba": 137.327, "Pb": 207.2,
+}
+# How far two sources may be apart.
+LOG_K, ENTHALPY = 0.1, 3.0
+
+
+def table(name):
+    with open(HERE / name, encoding="utf8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def elements(formula):
+    """The atoms of a formula and its charge under `charge`."""
+    match = re.search(r"\^?(\d*)([+-])$", formula) if "^" in formula else re.search(r"()([+-])$", formula)
+    charge, body = 0, formula
+    if match:
+        charge = int(match.group(1) or 1) * (1 if match.group(2) == "+" else -1)
+        body = formula[: match.start()]
+    # Old names of the library write Ca2+ without a caret.
+    if match and "^" not in formula and re.fullmatch(r"[A-Z][a-z]?[234]", body):
+        charge, body = charge * int(body[-1]), body[:-1]
+    found = {"charge": charge}
+    for part in body.split("."):
+        times = re.match(r"^\d+(?=[A-Z(])", part)
+        factor, part = (int(times.group()), part[times.end():]) if times else (1, part)
+        stack = [{}]
+        for token in re.finditer(r"([A-Z][a-z]?)(\d*)|(\()|\)(\d*)", part):
+            if token.group(1):
+                stack[-1][token.group(1)] = stack[-1].get(token.group(1), 0) + int(token.group(2) or 1)
+            elif token.group(3):
+                stack.append({})
+            else:
+                inner, count = stack.pop(), int(token.group(4) or 1)
+                for element, number in inner.items():
+                    stack[-1][element] = stack[-1].get(element, 0) + number * count
+        for element, number in stack[0].items():
+            found[element] = found.get(element, 0) + factor * number
+    return found
+
+
+def sides(equation):
+    """Stoichiometric numbers of an equation, products positive."""
+    numbers = {}
+    for side, sign in zip(equation.split(" <-> "), (-1, 1)):
+        for term in side.split(" + "):
+            match = re.match(r"^(\d+) (.*)$", term.strip())
+            count, name = (int(match.group(1)), match.group(2)) if match else (1, term.strip())
+            numbers[name] = numbers.get(name, 0) + sign * count
+    return numbers
+
+
+def formulas():
+    """The formula of each species, of the library and of the tables."""
+    text = (LIBRARY / "species.mtx").read_text(encoding="utf8")
+    found = dict(re.findall(r'^species (\S+) \{\n(?:(?!^\}).*\n)*?    formula: "(.*?)"', text, re.M))
+    for row in table("species.csv"):
+        found[row["name"]] = row["formula"]
+    return found
+
+
+def analytic(row):
+    """Numbers of log10 K = A1 + A2 T + A3 / T + A4 log10 T + ... with a constant heat capacity change."""
+    value, enthalpy, capacity = float(row["value"]), float(row["enthalpy"]) * 1e3, float(row["capacity"])
+    a3 = -(enthalpy - capacity * T0) / R_LN10
+    a4 = capacity / 8.314462618
+    a1 = -value - a3 / T0 - a4 * math.log10(T0)
+    return [round(a1, 5), 0, round(a3, 3), round(a4, 5)]
+
+
+def solved(matrix, right):
+    """The solution of three linear equations, by elimination."""
+    rows = [row[:] + [value] for row, value in zip(matrix, right)]
+    for i, _ in enumerate(rows):
+        pivot = max(range(i, len(rows)), key=lambda k: abs(rows[k][i]))
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        for k, row in enumerate(rows):
+            if k != i:
+                factor = row[i] / rows[i][i]
+                rows[k] = [a - factor * b for a, b in zip(row, rows[i])]
+    return [row[-1] / row[i] for i, row in enumerate(rows)]
+
+
+def saturated(numbers, formula, water, percent, celsius):
+    """log10 K of a salt of which a saturated solution holds this much, with the activities of `davies` in stdlib/chemistry.mtx."""
+    known = formulas()
+    anhydrous = mass(formula)
+    molality = percent / (100 - percent) / anhydrous * 1e3
+    rise = celsius - 25
+    # sqrt(I) / (1 + sqrt(I)) - 0.3 I, up to an ionic strength of 1 mol/kg.
+    ions = {name: count for name, count in numbers.items() if name != "water" and count > 0}
+    charges = {name: elements(known[name])["charge"] for name in ions}
+    strength = min(0.5 * molality * sum(count * charges[name] ** 2 for name, count in ions.items()), 1)
+    bracket = math.sqrt(strength) / (1 + math.sqrt(strength)) - 0.3 * strength
+    slope = 0.51 + 8.74e-4 * rise + 4.34e-6 * rise**2
+    total = sum(count * (math.log10(count * molality) - slope * charges[name] ** 2 * bracket) for name, count in ions.items())
+    return total - water * 0.017 * molality * sum(ions.values()) / math.log(10)
+
+
+def crystallising(row):
+    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a salt, by least squares."""
+    numbers = sides(row["equation"])
+    salt = next(name for name, count in numbers.items() if count < 0)
+    points = [point for point in table("solubilities.csv") if point["salt"] == salt]
+    basis, logs = [], []
+    for point in points:
+        celsius = float(point["temperature"])
+        kelvin = celsius + 273.15
+        basis.append([1, 1e3 / kelvin, math.log10(kelvin / T0)])
+        logs.append(saturated(numbers, point["formula"], numbers.get("water", 0), float(point["mass_percent"]), celsius))
+    matrix = [[sum(b[i] * b[k] for b in basis) for k in range(3)] for i in range(3)]
+    a, b, c = solved(matrix, [sum(row_[i] * value for row_, value in zip(basis, logs)) for i in range(3)])
+    worst = max(abs(sum(x * y for x, y in zip((a, b, c), row_)) - value) for row_, value in zip(basis, logs))
+    order = sum(count for name, count in numbers.items() if count > 0 and name != "water")
+    return [round(a - c * math.log10(T0), 5), 0, round(1e3 * b, 3), round(c, 5)], 100 * (10 ** (worst / order) - 1)
+
+
+def mass(formula):
+    """The molar mass of a formula, g/mol."""
+    return sum(MASSES[element] * count for element, count in elements(formula).items() if element != "charge")
+
+
+def number(value):
+    return f"{float(value):.10g}"
+
+
+def tag(*names):
+    return "  // " + "".join(f"[{name}]" for name in dict.fromkeys(n for n in names if n))
+
+
+FIELDS = [
+    ("smiles", '"{}"', None), ("formula", '"{}"', None), ("phase", '"{}"', None), ("density", "{} g/mL", "density_source"),
+    ("molar_volume", "{} mL/mol", "volume_source"), ("heat_capacity", "{} J/(mol*K)", "capacity_source"), ("melting_point", "{} degC", "crc"),
+    ("boiling_point", "{} degC", "crc"), ("dissolves", "{}", None), ("pka", "{}", "pka_source"), ("pkah", "{}", "pkah_source"),
+    ("solubility", "{} g/kg", "solubility_source"), ("absorbs", "({}) L/(mol*cm)", "absorbs_source"), ("crowding", "{} mL/mol", "dh"),
+    ("ion_size", "{} nm", "pdh"), ("salting", "{}", "pdh"),
+]
+
+
+def species(row):
+    lines = [f"/// {row['doc']}", f"species {row['name']} {{"] if not row["same_as"] else []
+    if row["same_as"]:
+        return [f"species {row['name']} {{ same_as: {row['same_as']} }}", ""]
+    for field, form, source in FIELDS:
+        if row.get(field):
+            name = row[source] if source and source in row else source
+            value = row[field].replace("\\", "\\\\")
+            lines.append(f"    {field}: {form.format(value)}" + (tag(name) if name else ""))
+    if row["hazards"]:
+        lines.append("    hazards: [" + ", ".join(f'"{hazard}"' for hazard in row["hazards"].split(";")) + "]")
+    return lines + ["}", ""]
+
+
+def equilibrium(row):
+    window = f"valid: {row['low']} degC .. {row['high']} degC"
+    sources = tag(row["source"], row["enthalpy_source"])
+    head = f"equilibrium {row['name']}: {row['equation']} {{"
+    said = []
+    if row["analytic"]:
+        constant = "analytic: [" + ", ".join(number(x) for x in row["analytic"].split()) + "]"
+        sources = tag(row["source"])
+    elif row["kind"] == "solubility":
+        numbers, worst = crystallising(row)
+        constant = "analytic: [" + ", ".join(number(x) for x in numbers) + "]"
+        said = [f"    // {sources.replace('  // ', '')}, met within {max(worst, 0.1):.1f} %"]
+        sources = ""
+    elif row["capacity"] and row["kind"] == "pka":
+        constant = "analytic: [" + ", ".join(number(x) for x in analytic(row)) + "]"
+        said = [f"    // pK {number(row['value'])}, {number(row['enthalpy'])} kJ/mol, {number(row['capacity'])} J/(mol*K){sources.replace('  //', '')}"]
+        sources = ""
+    else:
+        constant = f"{row['kind']}: {number(row['value'])}"
+        if row["enthalpy"]:
+            constant += f", enthalpy: {number(row['enthalpy'])} kJ/mol"
+    line = f"{head} {constant}, {window} }}{sources}"
+    doc = [f"/// {row['doc']}"]
+    if len(line) <= WIDTH and not said:
+        return doc + [line, ""]
+    return doc + [head] + said + [f"    {constant}{sources}", f"    {window}", "}", ""]
+
+
+def sections(rows):
+    found = {}
+    for row in rows:
+        found.setdefault(row["section"], []).append(row)
+    return found
+
+
+def wrapped(text, width=WIDTH - 4):
+    """Words of a paragraph in lines."""
+    lines, line = [], ""
+    for word in text.split():
+        if line and len(line) + 1 + len(word) > width:
+            lines, line = lines + [line], word
+        else:
+            line = f"{line} {word}".strip()
+    return lines + [line]
+
+
+def module(entry, all_species, all_equilibria, sources):
+    name = entry["module"]
+    own = [row for row in all_species if row["module"] == name]
+    rules = [row for row in all_equilibria if row["module"] == name]
+    body = []
+    for title in dict.fromkeys(row["section"] for row in rules + own):
+        body += [f"// ---- {title}", ""]
+        for row in sections(own).get(title, []):
+            body += species(row)
+        for row in sections(rules).get(title, []):
+            body += equilibrium(row)
+    used = [row for row in sources if f"[{row['tag']}]" in "\n".join(body)]
+    head = ["mtx 1"]
+    for paragraph in (HERE / "modules" / f"{name}.md").read_text(encoding="utf8").strip().split("\n\n"):
+        head += [f"//! {line}" for line in wrapped(paragraph.replace("\n", " "))] + ["//!"]
+    head += ["//! `[x]` after a number names its source:", "//!"]
+    for row in used:
+        first, *rest = wrapped(f"- `[{row['tag']}]` {row['says']}")
+        head += [f"//! {first}"] + [f"//!   {line}" for line in rest]
+    uses = [f"use std::{used}" for used in entry["uses"].split()]
+    tail = HERE / "modules" / f"{name}.more"
+    written = "\n".join(head + ([""] + uses if uses else []) + [""] + body).rstrip() + "\n"
+    return written + ("\n" + tail.read_text(encoding="utf8") if tail.exists() else "")
+
+
+def listed(names):
+    """Names in lines of a page."""
+    return "\n".join(wrapped(", ".join(f"`{name}`" for name in names)))
+
+
+def section(entry, all_species, all_equilibria):
+    """What docs/library.md says of a module."""
+    name = entry["module"]
+    own = [row for row in all_species if row["module"] == name]
+    rules = [row for row in all_equilibria if row["module"] == name]
+    says = (HERE / "modules" / f"{name}.md").read_text(encoding="utf8").split("\n\n")[0].replace("\n", " ").strip()
+    lines = [f"## `std::{name}`", "", re.sub(r"\((\w+)\.mtx\)", r"(library/\1.md)", says), ""]
+    for title, rows in sections(own).items():
+        lines += [f"{title[0].upper()}{title[1:]}:", "", listed(row["name"] for row in rows), ""]
+    tail = HERE / "modules" / f"{name}.more"
+    if tail.exists():
+        found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)", tail.read_text(encoding="utf8"), re.M)
+        lines += ["| name | is |", "| --- | --- |"]
+        lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}` | {doc} |" for doc, kind, word in found] + [""]
+    if name != "equilibria":
+        return "\n".join(lines + ([f"Equilibria ({len(rules)}):", "", listed(row["name"] for row in rules), ""] if rules else []))
+    lines += ["| equilibrium | constant at 25 °C | enthalpy, kJ/mol | source |", "| --- | --- | --- | --- |"]
+    words = {"pka": "pKa", "pksp": "pKsp", "log_constant": "log10 K"}
+    for row in rules:
+        moves = ", analytic" if row["analytic"] or row["capacity"] else ""
+        lines.append(f"| `{row['name']}` | {words[row['kind']]} {number(row['value'])}{moves} | {row['enthalpy']} | {row['source']} |")
+    return "\n".join(lines + [""])
+
+
+def paged(page, entries, all_species, all_equilibria):
+    """The page of the library with the sections of these modules."""
+    for before, entry in zip([{"module": "framings"}, *entries], entries):
+        text = section(entry, all_species, all_equilibria)
+        old = re.search(rf"^## `std::{entry['module']}`\n.*?(?=^## )", page, re.M | re.S)
+        if old:
+            page = page[: old.start()] + text + "\n" + page[old.end():]
+        else:
+            at = re.search(rf"^## `std::{before['module']}`\n.*?(?=^## )", page, re.M | re.S).end()
+            page = page[:at] + text + "\n" + page[at:]
+    return page
+
+
+def rank(rows):
+    """The rank of a matrix by elimination."""
+    rows, found = [dict(row) for row in rows], 0
+    while rows:
+        row = rows.pop()
+        row = {key: value for key, value in row.items() if abs(value) > 1e-9}
+        if not row:
+            continue
+        found += 1
+        key = max(row, key=lambda k: abs(row[k]))
+        for other in rows:
+            if key in other:
+                factor = other[key] / row[key]
+                for column, value in row.items():
+                    other[column] = other.get(column, 0) - factor * value
+    return found
+
+
+def faults(rows):
+    known, found = formulas(), []
+    for row in rows:
+        sums = {}
+        for name, count in sides(row["equation"]).items():
+            if name not in known:
+                found.append(f"{row['name']}: no species {name}")
+                continue
+            for element, number_of in elements(known[name]).items():
+                sums[element] = sums.get(element, 0) + count * number_of
+        off = {element: value for element, value in sums.items() if value}
+        if off:
+            found.append(f"{row['name']}: {row['equation']} is off by {off}")
+    if rank([sides(row["equation"]) for row in rows]) < len(rows):
+        found.append("an equilibrium follows from others")
+    return found
+
+
+def report(rows):
+    for row in rows:
+        said = []
+        if row["kind"] == "solubility":
+            continue
+        if not row["second"]:
+            said.append("one source")
+        elif abs(float(row["second"]) - float(row["value"])) > LOG_K:
+            said.append(f"[{row['second_source']}] has {row['second']}")
+        if not row["enthalpy"] and not row["analytic"]:
+            said.append("no enthalpy")
+        elif row["second_enthalpy"] and row["enthalpy"] and abs(float(row["second_enthalpy"]) - float(row["enthalpy"])) > ENTHALPY:
+            said.append(f"enthalpy {row['enthalpy']}, [{row['second_enthalpy_source']}] has {row['second_enthalpy']}")
+        if said:
+            print(f"{row['module']}: {row['name']}, {row['kind']} {row['value']} [{row['source']}]: {'; '.join(said)}")
+
+
+def main():
+    modules, all_species, rows, sources = (table(f"{name}.csv") for name in ("modules", "species", "equilibria", "sources"))
+    found = faults(rows)
+    for entry in modules:
+        text = module(entry, all_species, rows, sources)
+        path = LIBRARY / f"{entry['module']}.mtx"
+        if "--check" in sys.argv:
+            if not path.exists() or path.read_text(encoding="utf8") != text:
+                found.append(f"{path.name} differs from its tables: run stdlib/data/equilibria.py")
+        else:
+            path.write_text(text, encoding="utf8")
+    path = LIBRARY.parent / "docs" / "library.md"
+    page = path.read_text(encoding="utf8")
+    text = paged(page, modules, all_species, rows)
+    if "--check" not in sys.argv:
+        path.write_text(text, encoding="utf8")
+    elif page != text:
+        found.append("docs/library.md differs from the tables: run stdlib/data/equilibria.py")
+    if "--report" in sys.argv:
+        report(rows)
+    print("\n".join(found), end="\n" if found else "")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

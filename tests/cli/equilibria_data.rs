@@ -1,0 +1,81 @@
+//! The equilibria of the library: textbook figures, and what is warned of with and without them.
+
+use crate::harness::{flat, folder, matterixc_in, pass_cases, write};
+
+#[test]
+fn buffers_have_the_ph_of_their_standards() {
+    pass_cases("ph_standards.mtx", &["look"]);
+}
+
+#[test]
+fn metals_dissolve_precipitate_and_are_bound_as_in_handbooks() {
+    pass_cases("metals.mtx", &["look"]);
+}
+
+#[test]
+fn saltpetre_crystallises_on_cooling_with_its_yield() {
+    pass_cases("crystals.mtx", &["recrystallise"]);
+}
+
+/// What a check says of a cup whose pH is asked for.
+fn said_of(dir: &std::path::Path, uses: &str, cup: &str, holding: &str) -> String {
+    let text = format!(
+        "mtx 1\n{uses}\nuse std::glassware::Beaker250mL\nasset Cup: Beaker250mL {{ {cup} }}
+lab bench {{ ambient: 25 degC, cup = Cup at (0, 0, 0) m holding {holding} }}
+workflow look in bench {{
+    wait 1 s
+    expect acidity(cup.contents) < 14
+}}\n"
+    );
+    write(dir, "cup.mtx", text);
+    flat(&matterixc_in(dir, &["check", "cup.mtx"]).out)
+}
+
+#[test]
+fn cautions_of_acids_fall_silent_with_the_modules_that_have_them() {
+    let dir = folder("equilibria_data_cautions");
+    let cases = [
+        ("use std::equilibria", "100 g of water + 10 mmol of CuSO4", "leaves out what Cu2+ does"),
+        ("use std::metals", "100 g of water + 10 mmol of CuSO4", ""),
+        ("use std::equilibria", "100 g of water + 10 mmol of pyridine", "leaves out what pyridine does"),
+        ("use std::acids", "100 g of water + 10 mmol of pyridine", ""),
+        ("use std::acids", "100 g of water + 10 mmol of Et3N", ""),
+        (
+            "use std::equilibria\nuse std::buffers",
+            "100 g of water + 10 mmol of citric_acid_monohydrate + 5 mmol of MES",
+            "",
+        ),
+        ("use std::complexes", "100 g of water + 1 mmol of EDTA_disodium_dihydrate + 1 mmol of CaCO3", ""),
+    ];
+    for (uses, holding, why) in cases {
+        let said = said_of(&dir, uses, "", holding);
+        assert!(said.contains(why) && said.contains("no findings") == why.is_empty(), "{uses}, {holding}: {said}");
+    }
+}
+
+#[test]
+fn a_salt_that_an_equilibrium_keeps_is_not_said_to_be_left_in_solution() {
+    let dir = folder("equilibria_data_salts");
+    let cases = [
+        ("", "100 g of water + 60 g of NaCl", "holds more NaCl than dissolves"),
+        ("use std::crystals", "100 g of water + 60 g of NaCl", ""),
+        // What crystallises is gypsum, and soda with its water.
+        ("use std::solids", "100 g of water + 5 mmol of CaSO4", ""),
+        ("use std::crystals\nuse std::salts", "100 g of water + 60 g of Na2CO3", ""),
+    ];
+    for (uses, holding, why) in cases {
+        let said = said_of(&dir, uses, "", holding);
+        let found = said.contains("than dissolves");
+        assert!(said.contains(why) && found != why.is_empty(), "{uses}, {holding}: {said}");
+    }
+}
+
+#[test]
+fn crystals_hold_by_the_law_of_davies_only() {
+    let dir = folder("equilibria_data_davies");
+    let salt = "100 g of water + 60 g of NaCl";
+    let other = said_of(&dir, "use std::crystals", "contents: { activities: debye_hueckel }", salt);
+    assert!(other.contains("hold with `activities: davies` only"), "{other}");
+    let davies = said_of(&dir, "use std::crystals", "", salt);
+    assert!(!davies.contains("hold with `activities: davies` only"), "{davies}");
+}
