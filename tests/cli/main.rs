@@ -63,6 +63,7 @@ mod strict;
 mod studies;
 mod tempo;
 mod time;
+mod titrations;
 mod together;
 mod twin;
 mod types;
