@@ -838,7 +838,7 @@ fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
         let id = InstanceId(i);
         for m in lab.derived_members(id) {
             let MemberKind::Value { role: Role::Derived, name, ty, options, .. } = &m.member.kind else { continue };
-            if options.iter().any(|o| o.name.text == "hidden") {
+            if lab.is_hidden(id, m, options) {
                 continue;
             }
             let ty = lab.resolve_type(ty, m.module);

@@ -65,6 +65,7 @@ mod studies;
 mod substance;
 mod tempo;
 mod time;
+mod titrations;
 mod together;
 mod twin;
 mod types;

@@ -107,7 +107,30 @@ fn contents(program: &Program, owners: &Owners, document: &mut Document) {
             .filter(|(_, value)| *value != 0.0)
             .map(|(o, value)| add(series, &o.name, &label(&o.name), &o.unit.symbol, o.unit.of_si(value)))
             .collect();
+        let solids = mixture.contents.iter().filter(|content| model.is_solid(content)).filter_map(|content| {
+            let i = content.settled? as usize;
+            Some((
+                model.observables.get(i)?,
+                *observables.get(i)?.first()?,
+                model.species.get(content.species as usize)?,
+            ))
+        });
+        let solids: Vec<u32> = solids
+            .filter(|(_, amount, _)| *amount > 0.0)
+            .map(|(o, amount, s)| {
+                add(
+                    series,
+                    &format!("{}.solid[{}]", instance.name, s.name),
+                    &s.name,
+                    &o.unit.symbol,
+                    o.unit.of_si(amount),
+                )
+            })
+            .collect();
         made.groups = vec![("properties".to_owned(), properties), ("concentrations".to_owned(), concentrations)];
+        if !solids.is_empty() {
+            made.groups.push(("solids".to_owned(), solids));
+        }
         document.contents.push(made);
     }
 }

@@ -20,6 +20,20 @@ pub struct Inventory {
     pub streams: Vec<(u32, u32)>,
     /// Studies of the workflow and their numbers of runs.
     pub studies: Vec<(String, u64)>,
+    /// Reactions, each in the direction in which it is written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reactions: Vec<Reaction>,
+}
+
+/// What a reaction makes of what.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reaction {
+    /// Its name.
+    pub name: String,
+    /// What it takes: indices into `Model::species` with coefficients.
+    pub reactants: Vec<(u32, f64)>,
+    /// What it makes.
+    pub products: Vec<(u32, f64)>,
 }
 
 /// A species that has to be measured out.

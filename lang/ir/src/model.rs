@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::equilibrium::{Part, Phase};
 use crate::scene::InstanceId;
-use crate::{Code, Graph, NodeId, Severity, Span, Unit};
+use crate::{Code, Graph, NodeId, Op, Severity, Span, Unit};
 
 /// What the numbers of a discrete or continuous state mean.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -230,6 +231,17 @@ pub struct Mixture {
     pub properties: Vec<u32>,
     /// The library's concentration of each entry of `contents`; index into [`Model::observables`].
     pub concentrations: Vec<u32>,
+}
+
+impl Model {
+    /// Whether equilibria have what stands for a content as a pure solid.
+    pub fn is_solid(&self, content: &Content) -> bool {
+        let settled = content.settled.and_then(|i| self.observables.get(i as usize)?.value.first());
+        let Some(Op::Solved(call, _)) = settled.map(|node| self.graph.op(*node)) else { return false };
+        let call = self.graph.call(call);
+        let Part::Amount(member) = call.part else { return false };
+        call.system.members().get(member as usize).is_some_and(|m| m.phase == Phase::Solid)
+    }
 }
 
 /// A named quantity that follows from the state, recorded beside it.

@@ -67,6 +67,9 @@ pub struct Thing {
     pub facts: Vec<Fact>,
     /// Amounts of the species that may be in it, by name.
     pub species: Vec<Fact>,
+    /// Amounts at equilibrium of those of them that an equilibrium has.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub settled: Vec<Settled>,
     /// Reagents that it has touched or may have touched, where the library asks for that.
     pub reagents: Vec<Reagent>,
 }
@@ -74,8 +77,19 @@ pub struct Thing {
 impl Thing {
     /// Whether the statement changes anything of it.
     pub fn changed(&self) -> bool {
-        self.facts.iter().chain(&self.species).any(|f| f.changed) || self.reagents.iter().any(|r| r.changed)
+        let facts = self.facts.iter().chain(&self.species);
+        facts.chain(self.settled.iter().map(|s| &s.amount)).any(|f| f.changed)
+            || self.reagents.iter().any(|r| r.changed)
     }
+}
+
+/// How much of a species there is at equilibrium.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settled {
+    /// Its amount.
+    pub amount: Fact,
+    /// Whether it is a solid beside the solution.
+    pub solid: bool,
 }
 
 /// One thing that is known.

@@ -11,7 +11,7 @@ use crate::declare::tables::{MATTER, is_true};
 use crate::elaborate::lab::SYMMETRIC;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::free::Bound;
-use crate::eval::lab::given::{GIVEN_BY, INSTEAD, ONLY_WITH};
+use crate::eval::lab::given::{GIVEN_BY, HIDDEN, INSTEAD, ONLY_WITH};
 use crate::eval::lab::properties::{GIVES, GIVES_AT};
 use crate::inventory::{COUNTS_AS, count_of};
 use crate::near;
@@ -20,8 +20,8 @@ use crate::near;
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
         Role::State => ("a state", &["unit", "scale", COUNTS_AS, BARS]),
-        Role::Extensive => ("an extensive quantity", &["unit", "scale", "hidden", ONLY_WITH, MATTER]),
-        Role::Derived => ("a derived quantity", &["unit", "hidden", INSTEAD, COUNTS_AS]),
+        Role::Extensive => ("an extensive quantity", &["unit", "scale", HIDDEN, ONLY_WITH, MATTER]),
+        Role::Derived => ("a derived quantity", &["unit", HIDDEN, INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
         Role::Param => ("a parameter", &["above", "at_least", "at_most", GIVEN_BY, GIVES, GIVES_AT]),
         Role::Flow => ("a flow", &[]),
@@ -29,6 +29,11 @@ pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     };
     let mut found = unknown(what, given, known);
     found.extend(given.iter().filter_map(misfit));
+    let is_plain = |o: &&NamedExpr| o.name.text == HIDDEN && role != Role::Derived && !is_true(&o.value);
+    found.extend(given.iter().filter(is_plain).map(|o| {
+        let headline = format!("`{HIDDEN}` of {what} is `true`, or left out");
+        Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else")
+    }));
     found
 }
 

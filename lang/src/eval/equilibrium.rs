@@ -74,17 +74,31 @@ impl<'a> Elaborator<'a> {
         Some(self.graph.solved(&speciation.system, part, &speciation.args))
     }
 
+    /// The amount of a species at equilibrium once all salts there have dissolved.
+    pub fn ready_amount(&mut self, id: InstanceId, s: SpeciesId) -> NodeId {
+        let place = self.speciation_with(id, true).and_then(|made| Some((made.place(s)?, made)));
+        match place {
+            Some((place, made)) => self.graph.solved(&made.system, Part::Amount(place), &made.args),
+            None => self.held(id, s, true),
+        }
+    }
+
     /// The equilibria of a mixture; made once.
     pub fn speciation(&mut self, id: InstanceId) -> Option<Arc<Speciation>> {
+        self.speciation_with(id, false)
+    }
+
+    /// The same, where `split` with all salts dissolved that there may still be.
+    fn speciation_with(&mut self, id: InstanceId, split: bool) -> Option<Arc<Speciation>> {
         if self.tables.equilibria.is_empty() || self.prototype || self.mode().at_start || self.mode().pooled {
             return None;
         }
-        if let Some(known) = self.speciations.get(&id) {
+        if let Some(known) = self.speciations.get(&(id, split)) {
             return known.clone();
         }
-        let made = self.in_mode(Mode { pooled: true, ..Mode::default() }, |lab| lab.make_speciation(id, None));
+        let made = self.in_mode(Mode { pooled: true, ..Mode::default() }, |lab| lab.make_speciation(id, None, split));
         let made = made.map(Arc::new);
-        self.speciations.insert(id, made.clone());
+        self.speciations.insert((id, split), made.clone());
         made
     }
 
@@ -95,7 +109,7 @@ impl<'a> Elaborator<'a> {
             return None;
         }
         let mode = Mode { at_start: true, pooled: true, ..Mode::default() };
-        let made = self.in_mode(mode, |lab| lab.make_speciation(id, Some(temperature)))?;
+        let made = self.in_mode(mode, |lab| lab.make_speciation(id, Some(temperature), true))?;
         let heat = self.graph.solved(&made.system, Part::Heat, &made.args);
         let capacity = self.graph.solved(&made.system, Part::Capacity, &made.args);
         let reference = self.in_mode(mode, |lab| lab.surroundings(id))?[2];
@@ -104,8 +118,9 @@ impl<'a> Elaborator<'a> {
         Some(self.graph.binary(BinaryOp::Add, heat, warm))
     }
 
-    /// Writes out the system of a mixture; at a temperature that is given, or at the one that its heat content makes.
-    fn make_speciation(&mut self, id: InstanceId, temperature: Option<NodeId>) -> Option<Speciation> {
+    /// Writes out the system of a mixture; at a temperature that is given, or at the one that its heat content makes; where `split` with
+    /// what salts, acids and bases will give that have not dissolved yet.
+    fn make_speciation(&mut self, id: InstanceId, temperature: Option<NodeId>, split: bool) -> Option<Speciation> {
         let here: BTreeMap<SpeciesId, u32> = self.amounts_in(id).collect();
         let equilibria: Vec<usize> = (0..self.tables.equilibria.len())
             .filter(|e| {
@@ -125,7 +140,7 @@ impl<'a> Elaborator<'a> {
             return None;
         }
         let system = self.system_of(&members, &equilibria)?;
-        let args = self.numbers_of(id, &members, &equilibria, &system, temperature)?;
+        let args = self.numbers_of(id, &members, &equilibria, &system, (temperature, split))?;
         Some(Speciation { system, members, equilibria, args })
     }
 
@@ -174,7 +189,7 @@ impl<'a> Elaborator<'a> {
         members: &[SpeciesId],
         equilibria: &[usize],
         system: &System,
-        temperature: Option<NodeId>,
+        (temperature, split): (Option<NodeId>, bool),
     ) -> Option<Arc<[NodeId]>> {
         let layout = system.layout();
         let around = self.surroundings(id)?;
@@ -192,7 +207,7 @@ impl<'a> Elaborator<'a> {
         let law = self.law_of_activity(id);
         let property = self.capacity_property(id);
         for (i, s) in members.iter().enumerate() {
-            args[layout.amount(i)] = self.held(id, *s);
+            args[layout.amount(i)] = self.held(id, *s, split);
             if let Some(capacity) = property.as_ref().and_then(|p| self.capacity_of(*s, p)) {
                 args[layout.capacity_of(i)] = capacity;
             }
@@ -202,8 +217,8 @@ impl<'a> Elaborator<'a> {
             }
         }
         let ions = self.bystanders(id, members);
-        args[layout.bystanders()] = self.weighed(id, &ions, |charge| 0.5 * charge * charge);
-        args[layout.bystander_amount()] = self.weighed(id, &ions, |_| 1.0);
+        args[layout.bystanders()] = self.weighed(id, &ions, split, |charge| 0.5 * charge * charge);
+        args[layout.bystander_amount()] = self.weighed(id, &ions, split, |_| 1.0);
         match temperature {
             Some(temperature) => {
                 args[layout.capacity()] = self.graph.number(f64::INFINITY);
@@ -217,15 +232,15 @@ impl<'a> Elaborator<'a> {
         Some(args.into())
     }
 
-    /// What is there of a species, with what salts, acids and bases give of it; at the start these have not split yet.
-    fn held(&mut self, id: InstanceId, s: SpeciesId) -> NodeId {
+    /// What is there of a species; where `split` with what salts, acids and bases will give of it.
+    fn held(&mut self, id: InstanceId, s: SpeciesId, split: bool) -> NodeId {
         let here: Vec<(SpeciesId, u32)> = self.amounts_in(id).collect();
         let at_start = self.mode().at_start;
         let mut sum = self.graph.number(0.0);
         for (other, state) in here {
             let count = match other == s {
                 true => 1.0,
-                false if at_start && self.splits(other) => {
+                false if split && self.splits(other) => {
                     let ions = &self.tables.species.get(other).dissolves;
                     ions.iter().filter(|(ion, _)| *ion == s).map(|(_, n)| *n).sum()
                 }
@@ -253,10 +268,16 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The sum of amounts, each by a weight of its charge.
-    fn weighed(&mut self, id: InstanceId, ions: &[(SpeciesId, f64)], weight: impl Fn(f64) -> f64) -> NodeId {
+    fn weighed(
+        &mut self,
+        id: InstanceId,
+        ions: &[(SpeciesId, f64)],
+        split: bool,
+        weight: impl Fn(f64) -> f64,
+    ) -> NodeId {
         let mut sum = self.graph.number(0.0);
         for (s, charge) in ions {
-            let amount = self.held(id, *s);
+            let amount = self.held(id, *s, split);
             let part = self.multiple(weight(*charge), amount);
             sum = self.graph.binary(BinaryOp::Add, sum, part);
         }
@@ -531,6 +552,21 @@ impl<'a> Elaborator<'a> {
     pub fn splits(&self, s: SpeciesId) -> bool {
         let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(s));
         !is_balanced && !self.tables.species.get(s).dissolves.is_empty()
+    }
+
+    /// Whether equilibria have a species as a solid of its own.
+    pub fn is_solid(&self, s: SpeciesId) -> bool {
+        self.tables.equilibria.iter().any(|e| e.solids.contains(&s))
+    }
+
+    /// The amount of a species as it was put into a mixture; none of what cannot be there.
+    pub fn put_in(&mut self, id: InstanceId, s: SpeciesId) -> NodeId {
+        let state = self.amounts_in(id).find(|(other, _)| *other == s).map(|(_, state)| state);
+        match state {
+            Some(state) if self.mode().at_start => self.states[state as usize].initial,
+            Some(state) => self.graph.add(Op::State(state)),
+            None => self.graph.number(0.0),
+        }
     }
 
     /// `-log10` and the like of the activity of a species at equilibrium; `otherwise` where it takes part in none.

@@ -79,6 +79,14 @@ enum Bound {
     Activity,
     /// Whether an equilibrium of the file has a species.
     Balanced,
+    /// Whether the equilibria of a mixture have a species.
+    Settles,
+    /// Whether an equilibrium of the file has a species as a pure solid.
+    Solid,
+    /// The amount of a species that was put into a mixture.
+    Put,
+    /// The amount of a species at equilibrium once all salts have dissolved.
+    Ready,
     /// Whether an equilibrium of the file has two species on different sides, or on the same.
     Opposed(bool),
     /// The temperature at equilibrium.
@@ -96,6 +104,10 @@ enum Bound {
 const TABLE: &[(&str, Bound)] = &[
     ("activity", Bound::Activity),
     ("balanced", Bound::Balanced),
+    ("settles", Bound::Settles),
+    ("is_solid", Bound::Solid),
+    ("put_in", Bound::Put),
+    ("ready", Bound::Ready),
     ("opposed", Bound::Opposed(true)),
     ("alongside", Bound::Opposed(false)),
     ("settled_temperature", Bound::Settled),
@@ -273,6 +285,22 @@ impl Elaborator<'_> {
             (Bound::Balanced, [Value::Species(s)]) => {
                 let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(*s));
                 Value::Bool(self.graph.number(f64::from(u8::from(is_balanced))))
+            }
+            (Bound::Settles, [Value::Instance(m), Value::Species(s)]) => {
+                let has = self.speciation(*m).is_some_and(|speciation| speciation.place(*s).is_some());
+                Value::Bool(self.graph.number(f64::from(u8::from(has))))
+            }
+            (Bound::Solid, [Value::Species(s)]) => {
+                let is_solid = self.is_solid(*s);
+                Value::Bool(self.graph.number(f64::from(u8::from(is_solid))))
+            }
+            (Bound::Put, [Value::Instance(m), Value::Species(s)]) => {
+                let node = self.put_in(*m, *s);
+                self.num(node, self.tables.units.named("Amount"))
+            }
+            (Bound::Ready, [Value::Instance(m), Value::Species(s)]) => {
+                let node = self.ready_amount(*m, *s);
+                self.num(node, self.tables.units.named("Amount"))
             }
             (Bound::Opposed(apart), [Value::Species(a), Value::Species(b)]) => {
                 let holds = self.tables.equilibria.iter().any(|e| e.sides(*a, *b).is_some_and(|same| same != *apart));

@@ -5,7 +5,7 @@ mod substances;
 
 use std::collections::BTreeSet;
 
-use matterix_ir::inventory::{Count, Holding, Inventory, Tally};
+use matterix_ir::inventory::{Count, Holding, Inventory, Reaction, Tally};
 use matterix_ir::model::Mixture;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Sources};
@@ -67,6 +67,7 @@ pub fn inventory(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixtur
         tallies: tallies(lab),
         streams: streams.into_iter().collect(),
         studies: studies(lab, workflow),
+        reactions: reactions(lab),
     }
 }
 
@@ -87,6 +88,15 @@ fn tallies(lab: &mut Elaborator<'_>) -> Vec<Tally> {
         }
     }
     out
+}
+
+/// The reactions of the files.
+fn reactions(lab: &Elaborator<'_>) -> Vec<Reaction> {
+    let side = |terms: &[(SpeciesId, f64)]| terms.iter().map(|(s, n)| (s.0, *n)).collect();
+    let written = lab.tables.reactions.iter().filter(|r| !r.reverse);
+    written
+        .map(|r| Reaction { name: r.name.clone(), reactants: side(&r.reactants), products: side(&r.products) })
+        .collect()
 }
 
 /// The studies of a workflow and their numbers of runs.

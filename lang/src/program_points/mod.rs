@@ -7,12 +7,13 @@ use std::sync::Arc;
 
 use matterix_ir::model::{Domain, Observable};
 use matterix_ir::plan::{Plan, Step};
-use matterix_ir::points::{After, Fact, POINTS_VERSION, Point, Points, Reagent, Thing, Value};
+use matterix_ir::points::{After, Fact, POINTS_VERSION, Point, Points, Reagent, Settled, Thing, Value};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op, Sources, Span, Unit};
 
 use crate::ast::{MemberKind, Role};
 use crate::check::{AbstractValue, Seen};
+use crate::eval::lab::given::HIDDEN;
 use crate::eval::lab::{Elaborator, MemberKey, Mode};
 use crate::eval::{Num, Value as State};
 
@@ -33,6 +34,8 @@ struct About {
     instance: InstanceId,
     facts: Vec<Asked>,
     species: Vec<Asked>,
+    /// Amounts at equilibrium, with whether each is of a solid.
+    settled: Vec<(Asked, bool)>,
     reagents: Vec<(String, NodeId)>,
 }
 
@@ -51,7 +54,13 @@ impl Questions {
         observables: impl Iterator<Item = (InstanceId, &'o Observable)>,
     ) -> Questions {
         let mut things: Vec<About> = (0..lab.instances.len() as u32)
-            .map(|i| About { instance: InstanceId(i), facts: Vec::new(), species: Vec::new(), reagents: Vec::new() })
+            .map(|i| About {
+                instance: InstanceId(i),
+                facts: Vec::new(),
+                species: Vec::new(),
+                settled: Vec::new(),
+                reagents: Vec::new(),
+            })
             .collect();
         for (instance, o) in observables {
             // A colour is three numbers of which none is read by itself.
@@ -83,6 +92,11 @@ impl Questions {
                 asked.domain = Domain::Quantity(
                     lab.tables.unit("g").map_or(Unit::scaled("kg", 1.0), |u| Arc::unwrap_or_clone(u.unit)),
                 );
+            }
+            if let Some(node) = lab.settled_amount(key.instance, species) {
+                let solid = lab.is_solid(species);
+                let amount = Asked { name: asked.name.clone(), domain: asked.domain.clone(), node };
+                things[key.instance.0 as usize].settled.push((amount, solid));
             }
             things[key.instance.0 as usize].species.push(asked);
         }
@@ -134,8 +148,8 @@ impl Questions {
         let mut values = values.iter();
         let mut out = Vec::new();
         for about in &self.things {
-            let mut facts = |asked: &[Asked]| -> Vec<Fact> {
-                let known = asked.iter().zip(values.by_ref());
+            let mut facts = |asked: &mut dyn Iterator<Item = &Asked>| -> Vec<Fact> {
+                let known = asked.zip(values.by_ref());
                 let fact = |(a, (known, changed)): (&Asked, &(AbstractValue, bool))| Fact {
                     name: a.name.clone(),
                     value: words.value(known, &a.domain),
@@ -143,7 +157,13 @@ impl Questions {
                 };
                 known.map(fact).collect()
             };
-            let (facts, species) = (facts(&about.facts), facts(&about.species));
+            let (facts, species, settled) = (
+                facts(&mut about.facts.iter()),
+                facts(&mut about.species.iter()),
+                facts(&mut about.settled.iter().map(|s| &s.0)),
+            );
+            let solids = about.settled.iter().map(|(_, solid)| *solid);
+            let settled = settled.into_iter().zip(solids).map(|(amount, solid)| Settled { amount, solid }).collect();
             let touched = about.reagents.iter().zip(values.by_ref());
             let reagents = touched
                 .filter(|(_, (known, changed))| *changed || known.truth() != Some(false))
@@ -154,7 +174,7 @@ impl Questions {
                 })
                 .collect();
             let name = words.lab.instances[about.instance.0 as usize].name.clone();
-            out.push(Thing { instance: about.instance, name, facts, species, reagents });
+            out.push(Thing { instance: about.instance, name, facts, species, settled, reagents });
         }
         out
     }
@@ -162,8 +182,8 @@ impl Questions {
 
 impl About {
     fn nodes(&self) -> impl Iterator<Item = NodeId> {
-        let facts = self.facts.iter().chain(&self.species).map(|a| a.node);
-        facts.chain(self.reagents.iter().map(|r| r.1))
+        let facts = self.facts.iter().chain(&self.species).chain(self.settled.iter().map(|s| &s.0));
+        facts.map(|a| a.node).chain(self.reagents.iter().map(|r| r.1))
     }
 }
 
@@ -196,7 +216,7 @@ fn head(sources: &Sources, span: Span, block: bool) -> String {
 /// Whether the declaration of a member hides it.
 fn is_hidden(lab: &Elaborator<'_>, id: InstanceId, member: &str) -> bool {
     lab.members_of(id, member).first().is_some_and(|m| match &m.member.kind {
-        MemberKind::Value { options, .. } => options.iter().any(|o| o.name.text == "hidden"),
+        MemberKind::Value { options, .. } => options.iter().any(|o| o.name.text == HIDDEN),
         _ => false,
     })
 }
@@ -208,7 +228,7 @@ fn visible_states(lab: &Elaborator<'_>, id: InstanceId) -> Vec<(String, u32)> {
         let MemberKind::Value { role: Role::State | Role::Extensive, name, options, .. } = &m.member.kind else {
             continue;
         };
-        if options.iter().any(|o| o.name.text == "hidden") {
+        if options.iter().any(|o| o.name.text == HIDDEN) {
             continue;
         }
         let current = lab.instances[id.0 as usize].values.get(&MemberKey::of(m, Mode::default()));

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::inventory::Count;
+use matterix_ir::model::Content;
 use matterix_ir::scene::InstanceId;
 
 use super::follow::Follower;
@@ -52,6 +53,8 @@ impl Follower<'_> {
             weigh_in: maker.weigh_in(),
             consumables: maker.consumables(),
             labware: maker.labware(),
+            mixtures: maker.mixtures(),
+            yields: self.yields(),
             waste: maker.waste(),
             devices: maker.devices(outcome.end_time),
             person: self.asked.iter().map(|(time, text)| PersonLine { time: *time, text: text.clone() }).collect(),
@@ -75,8 +78,14 @@ impl Follower<'_> {
         self.owners(instance).last().copied().unwrap_or(instance)
     }
 
+    /// How much there is of a content, by its number in its mixture, at the end, mol: at equilibrium where that settles it.
+    pub(super) fn amount(&self, mixture: usize, number: usize, content: &Content) -> Option<f64> {
+        let settled = self.settled.get(mixture).and_then(|s| *s.amounts.get(number)?);
+        settled.or_else(|| self.states.get(content.state as usize).copied())
+    }
+
     /// The thing that holds a mixture.
-    fn holder(&self, mixture: usize) -> InstanceId {
+    pub(super) fn holder(&self, mixture: usize) -> InstanceId {
         let own = self.program.model.mixtures[mixture].instance;
         self.owners(own).get(1).copied().unwrap_or(own)
     }
@@ -264,6 +273,39 @@ impl Maker<'_, '_> {
         lines.into_iter().filter(|(_, (used, _))| *used > 0).map(line).collect()
     }
 
+    /// What is in vessels that equilibria say something of.
+    fn mixtures(&self) -> Vec<MixtureLine> {
+        let model = &self.of.program.model;
+        let is_told = |i: &usize| {
+            let at_equilibrium = model.mixtures[*i].contents.iter().any(|c| c.settled.is_some());
+            at_equilibrium && self.parts[*i] != Part::Device && self.of.origins.total(*i) > 0.0
+        };
+        (0..self.parts.len()).filter(is_told).map(|i| self.mixture(i)).collect()
+    }
+
+    fn mixture(&self, i: usize) -> MixtureLine {
+        let model = &self.of.program.model;
+        let mixture = &model.mixtures[i];
+        let name = self.name(mixture.instance);
+        let property = |(index, value): &(u32, f64)| {
+            let observable = model.observables.get(*index as usize)?;
+            let own = observable.name.strip_prefix(name).unwrap_or(&observable.name).trim_start_matches('.');
+            let (value, unit) = (observable.unit.of_si(*value), observable.unit.symbol.clone());
+            value.is_finite().then(|| (own.to_owned(), Quantity { value, unit }))
+        };
+        let solid = |(at, c): (usize, &Content)| {
+            let species = model.species.get(c.species as usize)?;
+            let amount = self.of.amount(i, at, c).filter(|n| *n > 0.0 && model.is_solid(c))?;
+            Some(SolidLine { name: species.name.clone(), amount: amount * 1e3, mass: amount * species.molar_mass * G })
+        };
+        let properties = self.of.settled.get(i).map_or(&[][..], |s| &s.properties);
+        MixtureLine {
+            vessel: self.name(self.of.holder(i)).to_owned(),
+            properties: properties.iter().filter_map(property).collect(),
+            solids: mixture.contents.iter().enumerate().filter_map(solid).collect(),
+        }
+    }
+
     fn waste(&self) -> Vec<WasteLine> {
         let (program, mut out) = (self.of.program, Vec::new());
         for (i, mixture) in program.model.mixtures.iter().enumerate() {
@@ -279,9 +321,9 @@ impl Maker<'_, '_> {
                 }
             }
             reagents.retain(|(_, m)| *m > mass * G * NOTHING);
-            let contents = mixture.contents.iter().filter_map(|c| {
+            let contents = mixture.contents.iter().enumerate().filter_map(|(at, c)| {
                 let species = program.model.species.get(c.species as usize)?;
-                let amount = self.of.states.get(c.state as usize)?;
+                let amount = self.of.amount(i, at, c)?;
                 Some((species.name.clone(), amount * species.molar_mass * G))
             });
             out.push(WasteLine {

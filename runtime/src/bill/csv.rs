@@ -62,6 +62,21 @@ pub fn csv(bill: &Bill) -> Result<String, String> {
         table.number("labware", &l.name, &l.kind, "places_used", l.places_used as f64, "")?;
         table.number("labware", &l.name, &l.kind, "places", l.places as f64, "")?;
     }
+    for m in &bill.mixtures {
+        for (name, of) in &m.properties {
+            table.number("mixture", &m.vessel, "", name, of.value, &of.unit)?;
+        }
+        for solid in &m.solids {
+            table.number("mixture", &m.vessel, &solid.name, "solid", solid.amount, "mmol")?;
+            table.number("mixture", &m.vessel, &solid.name, "solid_mass", solid.mass, "g")?;
+        }
+    }
+    for y in &bill.yields {
+        let of = format!("{} in {}", y.product, y.vessel);
+        table.number("yield", &y.reaction, &of, "made", y.made, "mmol")?;
+        table.number("yield", &y.reaction, &of, "at_most", y.at_most, "mmol")?;
+        table.number("yield", &y.reaction, &y.limiting, "left", y.left, "mmol")?;
+    }
     for w in &bill.waste {
         table.number("waste", &w.vessel, "", "mass", w.mass, "g")?;
         table.number("waste", &w.vessel, "", "mass_all", w.mass_all, "g")?;

@@ -2,6 +2,7 @@
 
 use matterix_ir::Program;
 use matterix_ir::inventory::Count;
+use matterix_ir::model::Mixture;
 use matterix_ir::plan::{Operation, StepId};
 use matterix_ir::scene::InstanceId;
 
@@ -9,6 +10,29 @@ use super::origins::{Origins, mass_of};
 use crate::exec::{Listener, OperationState};
 use crate::process::{Engine, Observer};
 use crate::touched::{Below, Touched};
+
+/// A mixture at the end, as its equilibria have it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Settled {
+    /// By content, mol; none of what takes part in no equilibrium.
+    pub(super) amounts: Vec<Option<f64>>,
+    /// By property of one number, SI.
+    pub(super) properties: Vec<(u32, f64)>,
+}
+
+impl Settled {
+    fn of(engine: &Engine<'_>, mixture: &Mixture) -> Settled {
+        let value = |index: u32| match engine.model().observables.get(index as usize)?.value.as_slice() {
+            [node] => Some(engine.eval(*node)),
+            _ => None,
+        };
+        let properties = mixture.properties.iter().filter_map(|i| Some((*i, value(*i)?)));
+        Settled {
+            amounts: mixture.contents.iter().map(|c| value(c.settled?)).collect(),
+            properties: properties.collect(),
+        }
+    }
+}
 
 /// What was noted of a run.
 pub struct Follower<'p> {
@@ -30,6 +54,10 @@ pub struct Follower<'p> {
     pub(super) asked: Vec<(f64, String)>,
     /// States as they were last shown.
     pub(super) states: Vec<f64>,
+    /// By state, what it was when the run began.
+    pub(super) first: Vec<f64>,
+    /// By mixture, what equilibria make of it at the end; empty before.
+    pub(super) settled: Vec<Settled>,
     /// Tallies by what they rest on, and mixtures that streams run between.
     watched: (Touched, Touched),
     /// By tally, since when it has been true, s.
@@ -55,6 +83,8 @@ impl<'p> Follower<'p> {
             steps: vec![0; program.scene.instances.len()],
             asked: Vec::new(),
             states: Vec::new(),
+            first: Vec::new(),
+            settled: Vec::new(),
             watched: Default::default(),
             since: vec![None; tallies],
             end: 0.0,
@@ -81,6 +111,7 @@ impl<'p> Follower<'p> {
         let count = model.states.len();
         self.watched = (Touched::new(count, tallies), Touched::new(count, mixtures));
         self.states = engine.states();
+        self.first = self.states.clone();
         for (index, tally) in stock.tallies.iter().enumerate() {
             self.tallies[index].0 = engine.eval(tally.value);
             self.counted(index, self.tallies[index].0, engine.time());
@@ -169,6 +200,7 @@ impl Observer for Follower<'_> {
 impl Listener for Follower<'_> {
     fn ended(&mut self, engine: &Engine<'_>) {
         let time = engine.time();
+        self.settled = engine.model().mixtures.iter().map(|m| Settled::of(engine, m)).collect();
         for index in 0..self.since.len() {
             if let Some(since) = self.since[index].take() {
                 self.ran(index, since, time);

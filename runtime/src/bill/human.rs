@@ -1,6 +1,6 @@
 //! The bill as it is read in a terminal.
 
-use super::{Bill, Quantity, ReagentLine};
+use super::{Bill, Quantity, ReagentLine, SolidLine};
 use crate::record::report::text::{Align, Table, amount, digits, mass};
 
 use Align::{Left, Right};
@@ -14,6 +14,8 @@ pub fn human(bill: &Bill) -> String {
         weigh_in(bill),
         consumables(bill),
         labware(bill),
+        mixtures(bill),
+        yields(bill),
         waste(bill),
         devices(bill),
         person(bill),
@@ -158,6 +160,37 @@ fn labware(bill: &Bill) -> Option<String> {
         table.row([l.name.clone(), l.kind.clone(), places]);
     }
     section("Vessels and labware", &table)
+}
+
+fn mixtures(bill: &Bill) -> Option<String> {
+    if bill.mixtures.is_empty() {
+        return None;
+    }
+    let mut table = Table::new(&[Left, Left]);
+    for m in &bill.mixtures {
+        let property = |(name, Quantity { value, unit }): &(String, Quantity)| {
+            format!("{name} {}{}{unit}", digits(*value), if unit.is_empty() { "" } else { " " })
+        };
+        let solid = |s: &SolidLine| format!("{} {}, solid ({})", amount(s.amount / 1e3), s.name, mass(s.mass));
+        let said: Vec<String> = m.properties.iter().map(property).chain(m.solids.iter().map(solid)).collect();
+        table.row([m.vessel.clone(), said.join("; ")]);
+    }
+    section("In the vessels at the end, at equilibrium", &table)
+}
+
+fn yields(bill: &Bill) -> Option<String> {
+    if bill.yields.is_empty() {
+        return None;
+    }
+    let mut table = Table::new(&[Left, Left, Right, Right, Right, Left]);
+    table.row(["", "", "made", "at most", "", ""]);
+    for y in &bill.yields {
+        let share = format!("{:.1} %", 100.0 * y.made / y.at_most);
+        let scarcest = format!("{} is the scarcest: {} left", y.limiting, amount(y.left / 1e3));
+        let [made, at_most] = [y.made, y.at_most].map(|n| amount(n / 1e3));
+        table.row([format!("{} in {}", y.product, y.vessel), y.reaction.clone(), made, at_most, share, scarcest]);
+    }
+    section("Yields", &table)
 }
 
 fn waste(bill: &Bill) -> Option<String> {

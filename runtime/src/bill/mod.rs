@@ -10,6 +10,7 @@ mod follow;
 mod human;
 mod origins;
 mod prices;
+mod yields;
 
 use serde::Serialize;
 
@@ -52,6 +53,12 @@ pub struct Bill {
     pub consumables: Vec<ConsumableLine>,
     /// Vessels and labware.
     pub labware: Vec<LabwareLine>,
+    /// What vessels hold at the end, where equilibria say something of it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mixtures: Vec<MixtureLine>,
+    /// What reactions made in vessels, and what they could have made at most.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub yields: Vec<YieldLine>,
     /// What is thrown away.
     pub waste: Vec<WasteLine>,
     /// Devices and how long they are busy.
@@ -157,6 +164,47 @@ pub struct LabwareLine {
     pub places_used: usize,
     /// How many it has.
     pub places: usize,
+}
+
+/// A mixture at equilibrium at the end.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MixtureLine {
+    /// The vessel.
+    pub vessel: String,
+    /// Its properties by name, such as its volume and pH.
+    pub properties: Vec<(String, Quantity)>,
+    /// The solids in it.
+    pub solids: Vec<SolidLine>,
+}
+
+/// A solid beside a solution.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SolidLine {
+    /// The species.
+    pub name: String,
+    /// mmol.
+    pub amount: f64,
+    /// g.
+    pub mass: f64,
+}
+
+/// What a reaction made of a species in a vessel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct YieldLine {
+    /// The vessel.
+    pub vessel: String,
+    /// The reaction.
+    pub reaction: String,
+    /// The species that it makes.
+    pub product: String,
+    /// What is there at the end, mmol.
+    pub made: f64,
+    /// What would be there if the scarcest reactant were used up, mmol.
+    pub at_most: f64,
+    /// The scarcest reactant.
+    pub limiting: String,
+    /// What is left of it, mmol.
+    pub left: f64,
 }
 
 /// What is thrown away into one vessel.

@@ -50,7 +50,7 @@ impl Series {
             return;
         }
         let last = self.pending.unwrap_or(from);
-        let is_gap = value.is_nan() != last.1.is_nan();
+        let is_gap = value.is_finite() != last.1.is_finite();
         if time > last.0 && !is_gap {
             return self.follow(from, (time, value));
         }
@@ -138,7 +138,7 @@ impl Series {
 
     /// Whether the line to a sample passes all those since the last kept point.
     fn fits(&self, from: (f64, f64), to: (f64, f64)) -> bool {
-        let is_gap = from.1.is_nan() && to.1.is_nan();
+        let is_gap = !from.1.is_finite() && !to.1.is_finite();
         is_gap || (self.slopes.0..=self.slopes.1).contains(&((to.1 - from.1) / (to.0 - from.0)))
     }
 

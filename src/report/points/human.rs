@@ -1,7 +1,7 @@
 //! Statements with what they change, for people.
 
 use matterix_ir::Span;
-use matterix_ir::points::{After, Fact, Point, Points, Thing, Value};
+use matterix_ir::points::{After, Fact, Point, Points, Settled, Thing, Value};
 
 use super::things::together;
 use super::values::{fact, time, value};
@@ -25,7 +25,7 @@ struct Row<'p> {
 /// Every statement with what it changes.
 pub(super) fn table(points: &Points, texts: &mut Texts<'_>) -> String {
     let mut out = format!("{} in {}\n", points.workflow, points.lab);
-    let holding = points.start.iter().filter(|t| !t.species.is_empty()).filter_map(|t| held(t, |_| true));
+    let holding = points.start.iter().filter(|t| !t.species.is_empty()).filter_map(|t| held(t, |_, _| true));
     out.push_str("  at the start\n");
     write(holding.collect(), usize::MAX, &mut out);
     let mut before: Option<&After> = None;
@@ -79,8 +79,8 @@ fn after(points: &Points, index: usize, show: impl Fn(&Thing) -> bool, texts: &m
     write(after.kept.iter().map(|f| (f.name.clone(), value(&f.value))).collect(), usize::MAX, &mut out);
     let shown = after.things.iter().filter(|thing| show(thing));
     let (holding, others): (Vec<&Thing>, Vec<&Thing>) = shown.partition(|t| !t.species.is_empty());
-    write(holding.into_iter().filter_map(|t| held(t, |_| true)).collect(), usize::MAX, &mut out);
-    write(others.into_iter().filter_map(|t| said_of(t, |_| true, usize::MAX)).collect(), usize::MAX, &mut out);
+    write(holding.into_iter().filter_map(|t| held(t, |_, _| true)).collect(), usize::MAX, &mut out);
+    write(others.into_iter().filter_map(|t| said_of(t, |_, _| true, usize::MAX)).collect(), usize::MAX, &mut out);
     out
 }
 
@@ -103,43 +103,78 @@ fn rows(points: &Points) -> Vec<Row<'_>> {
 
 /// What a statement changes, by thing; at the end of a block only what has not been said by the statement before it.
 fn changes(after: &After, before: Option<&After>) -> Vec<(String, String)> {
-    let new = |name: &str, f: &Fact| {
+    let new = |name: &str, state: State, f: &Fact| {
         let told = before.and_then(|b| b.things.iter().find(|t| t.name == name));
-        let told = told.and_then(|t| t.facts.iter().chain(&t.species).find(|o| o.name == f.name));
+        let told = told.and_then(|t| match state {
+            State::Put => t.facts.iter().chain(&t.species).find(|o| o.name == f.name),
+            State::Settled => t.settled.iter().map(|s| &s.amount).find(|o| o.name == f.name),
+        });
         // What only rounding tells apart reads the same.
         f.changed && told.is_none_or(|o| value(&o.value) != value(&f.value))
     };
     let kept = after.kept.iter().filter(|_| before.is_none()).map(|f| (f.name.clone(), value(&f.value)));
-    let things = after.things.iter().filter_map(|t| said_of(t, |f| new(&t.name, f), MOST_SPECIES));
+    let things = after.things.iter().filter_map(|t| said_of(t, |state, f| new(&t.name, state, f), MOST_SPECIES));
     kept.chain(things).collect()
 }
 
 /// What a mixture holds; nothing of an empty one.
-fn held(thing: &Thing, show: impl Fn(&Fact) -> bool) -> Option<(String, String)> {
+fn held(thing: &Thing, show: impl Fn(State, &Fact) -> bool) -> Option<(String, String)> {
     let there = thing.species.iter().any(|s| !is_nothing(&s.value));
     if there { said_of(thing, show, usize::MAX) } else { None }
 }
 
-/// The facts to be shown of a thing: its members, then its species, then its reagents.
-fn said_of(thing: &Thing, show: impl Fn(&Fact) -> bool, most: usize) -> Option<(String, String)> {
-    let facts: Vec<String> = thing.facts.iter().filter(|f| show(f)).map(fact).collect();
-    let mut species: Vec<&Fact> = thing.species.iter().filter(|f| show(f)).collect();
+/// What an amount is of: what was put there, like all other facts, or what is there at equilibrium.
+#[derive(Clone, Copy)]
+enum State {
+    Put,
+    Settled,
+}
+
+/// The facts to be shown of a thing: its members, then its species, at equilibrium too, then its reagents.
+fn said_of(thing: &Thing, show: impl Fn(State, &Fact) -> bool, most: usize) -> Option<(String, String)> {
+    let facts: Vec<String> = thing.facts.iter().filter(|f| show(State::Put, f)).map(fact).collect();
     // What is not there is worth saying only where it just went.
-    species.retain(|f| f.changed || !is_nothing(&f.value));
-    if facts.is_empty() && species.is_empty() {
+    let species = thing.species.iter().filter(|f| show(State::Put, f) && (f.changed || !is_nothing(&f.value)));
+    let species = listed(species.collect(), most);
+    let settled: Vec<&Settled> =
+        thing.settled.iter().filter(|s| show(State::Settled, &s.amount) && differs(thing, s)).collect();
+    let of = |solid: bool| listed(settled.iter().filter(|s| s.solid == solid).map(|s| &s.amount).collect(), most);
+    let (dissolved, solids) = (of(false), of(true));
+    if facts.is_empty() && species.is_empty() && settled.is_empty() {
         return None;
-    }
-    species.sort_by(|a, b| size(&b.value).total_cmp(&size(&a.value)));
-    let rest = species.len().saturating_sub(most);
-    let mut names: Vec<String> = species.iter().take(most).map(|f| fact(f)).collect();
-    if rest > 0 {
-        names.push(format!("{rest} more"));
     }
     let touched: Vec<String> =
         thing.reagents.iter().map(|r| if r.certain { r.name.clone() } else { format!("perhaps {}", r.name) }).collect();
-    let touched = if touched.is_empty() { String::new() } else { format!("touched {}", touched.join(", ")) };
-    let parts = [facts.join(", "), names.join(", "), touched];
+    let headed = |head: &str, names: &[String]| match names {
+        [] => String::new(),
+        _ if head.is_empty() => names.join(", "),
+        _ => format!("{head} {}", names.join(", ")),
+    };
+    let put = if thing.settled.is_empty() { "" } else { "put in" };
+    let parts = [
+        facts.join(", "),
+        headed(put, &species),
+        headed("at equilibrium", &dissolved),
+        headed("solid", &solids),
+        headed("touched", &touched),
+    ];
     Some((thing.name.clone(), parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join("; ")))
+}
+
+/// Amounts with those first of which there is most; the rest is only counted.
+fn listed(mut amounts: Vec<&Fact>, most: usize) -> Vec<String> {
+    amounts.sort_by(|a, b| size(&b.value).total_cmp(&size(&a.value)));
+    let rest = amounts.len().saturating_sub(most);
+    let names = amounts.iter().take(most).map(|f| fact(f));
+    names.chain((rest > 0).then(|| format!("{rest} more"))).collect()
+}
+
+/// Whether what is there at equilibrium is to be told: a solid that is there, or what is not as much as was put in.
+fn differs(thing: &Thing, settled: &Settled) -> bool {
+    let Fact { name, value: known, changed } = &settled.amount;
+    let put = thing.species.iter().find(|s| s.name == *name);
+    let is_same = !settled.solid && put.is_some_and(|put| value(&put.value) == value(known));
+    !is_same && (*changed || !is_nothing(known))
 }
 
 fn is_nothing(value: &Value) -> bool {

@@ -1,6 +1,6 @@
 //! What is known as JSON; the shape is promised in `docs/contents.md`.
 
-use matterix_ir::points::{Fact, Point, Points, Thing, Value};
+use matterix_ir::points::{Fact, Point, Points, Settled, Thing, Value};
 use serde_json::{Value as Json, json};
 
 use crate::report::json::span;
@@ -45,12 +45,23 @@ fn thing(thing: &Thing, everything: bool) -> Json {
     let facts = |all: &[Fact]| -> Vec<Json> { all.iter().filter(|f| everything || f.changed).map(fact).collect() };
     let reagents: Vec<Json> =
         thing.reagents.iter().map(|r| json!({ "name": r.name, "certain": r.certain, "changed": r.changed })).collect();
-    json!({
+    let mut out = json!({
         "name": thing.name,
         "members": facts(&thing.facts),
         "species": facts(&thing.species),
         "reagents": reagents,
-    })
+    });
+    if !thing.settled.is_empty() {
+        let shown = thing.settled.iter().filter(|s| everything || s.amount.changed);
+        out["settled"] = shown.map(settled).collect();
+    }
+    out
+}
+
+fn settled(settled: &Settled) -> Json {
+    let mut out = fact(&settled.amount);
+    out["solid"] = settled.solid.into();
+    out
 }
 
 fn fact(fact: &Fact) -> Json {

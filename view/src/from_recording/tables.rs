@@ -118,6 +118,10 @@ fn with_component(name: String, column: &Column) -> String {
     column.component.map_or(name.clone(), |i| format!("{name}.{}", i + 1))
 }
 
+/// Groups of a mixture with their titles.
+const GROUPS: [(&str, &str); 4] =
+    [("property", "properties"), ("concentration", "concentrations"), ("amount", "amounts"), ("solid", "solids")];
+
 fn contents(topic: &Topic, name: &str, owners: &Owners, document: &mut Document) {
     let columns = columns(topic);
     let body = owners.of(name);
@@ -142,7 +146,7 @@ fn contents(topic: &Topic, name: &str, owners: &Owners, document: &mut Document)
         }
     }
     let never = |column: &Column| column.group != "property" && column.values.iter().all(|v| *v == 0.0);
-    for (group, title) in [("property", "properties"), ("concentration", "concentrations"), ("amount", "amounts")] {
+    for (group, title) in GROUPS {
         let of = columns.iter().zip(&series).filter(|(c, _)| c.group == group && c.component.is_none() && !never(c));
         let listed: Vec<u32> = of.map(|(_, &index)| index).collect();
         if !listed.is_empty() {

@@ -19,6 +19,8 @@ pub const INSTEAD: &str = "instead";
 pub const GIVEN_BY: &str = "given_by";
 /// The option of an extensive quantity that is zero unless the lab gives the parameter it names.
 pub const ONLY_WITH: &str = "only_with";
+/// The option of a member that keeps it out of what is shown: `true`, or of a derived one a condition that no run changes.
+pub const HIDDEN: &str = "hidden";
 
 /// How far names in definitions are followed to what can be given.
 const DEEPEST: usize = 4;

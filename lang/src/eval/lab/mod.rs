@@ -260,8 +260,8 @@ pub struct Elaborator<'a> {
     pub touched_flow: bool,
     /// Concentrations by mixture, species, capability and kind.
     pub view_values: BTreeMap<(InstanceId, SpeciesId), BTreeMap<(DeclId, Dimension), Value>>,
-    /// The equilibria of mixtures that were asked for.
-    pub speciations: BTreeMap<InstanceId, Option<Arc<Speciation>>>,
+    /// The equilibria of mixtures that were asked for, as they are and with all salts dissolved.
+    pub speciations: BTreeMap<(InstanceId, bool), Option<Arc<Speciation>>>,
     /// Systems of equilibria by their species and equations.
     pub systems: Systems,
     /// Where constants of all equilibria of the file follow from each other, once that was asked for.

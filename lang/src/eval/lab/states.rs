@@ -8,11 +8,12 @@ use matterix_ir::scene::{Carrier, InstanceId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
 
 use super::Mode;
+use super::given::HIDDEN;
 use super::{Elaborator, ExtensiveKey, MemberKey};
 use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
 use crate::declare::SpeciesId;
 use crate::declare::Type;
-use crate::declare::tables::MemberRef;
+use crate::declare::tables::{MemberRef, is_true};
 use crate::eval::{Num, Scope, Value};
 
 impl<'a> Elaborator<'a> {
@@ -138,6 +139,24 @@ impl<'a> Elaborator<'a> {
             Value::Num(n) => self.graph.constant(n.node),
             _ => None,
         }
+    }
+
+    /// Whether the option `hidden` keeps a derived member out of what is shown.
+    pub fn is_hidden(&mut self, id: InstanceId, m: MemberRef<'a>, options: &'a [NamedExpr]) -> bool {
+        let Some(o) = options.iter().find(|o| o.name.text == HIDDEN) else { return false };
+        if is_true(&o.value) {
+            return true;
+        }
+        let condition = self.expr(&o.value, &mut Scope::of_member(id, m));
+        let known = match self.coerce(condition, &Type::Bool, o.value.span, HIDDEN) {
+            Value::Bool(node) => self.glance(node),
+            _ => return true,
+        };
+        if known.is_none() {
+            let headline = "whether a member is hidden cannot change in a run";
+            self.report(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "changes in a run"));
+        }
+        known.is_none_or(|truth| truth != 0.0)
     }
 
     /// `{ unit: "mmol" }`: how the member is shown.

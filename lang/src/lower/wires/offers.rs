@@ -296,7 +296,7 @@ impl<'a> Planner<'a, '_> {
     /// A reading, a state or what follows from states, where it is a number, a truth or a word.
     fn shown_of(&mut self, id: InstanceId, m: MemberRef<'a>) -> Option<Shown> {
         let MemberKind::Value { name, ty, options, .. } = &m.member.kind else { return None };
-        if options.iter().any(|o| o.name.text == "hidden") {
+        if self.lab.is_hidden(id, m, options) {
             return None;
         }
         let ty = self.lab.resolve_type(ty, m.module);

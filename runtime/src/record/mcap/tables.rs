@@ -67,7 +67,7 @@ fn states<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
     by_owner.into_iter().map(topic).collect()
 }
 
-/// `/contents/<mixture>`: amounts and concentrations by species, and properties.
+/// `/contents/<mixture>`: amounts and concentrations by species, properties, and amounts of what is a solid at equilibrium.
 fn contents<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
     let model = &run.program.model;
     let mut topics = Vec::new();
@@ -84,11 +84,16 @@ fn contents<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
         let named = |columns: Vec<Option<Column<'a>>>| -> Vec<Field<'a>> {
             species.iter().cloned().zip(columns).filter_map(|(s, c)| Some((s, c?))).collect()
         };
-        let groups = vec![
+        let is_solid = mixture.contents.iter().map(|content| model.is_solid(content));
+        let solids = species.iter().zip(&mixture.contents).zip(is_solid).filter(|(_, solid)| *solid);
+        let solids = solids.filter_map(|((name, content), _)| Some((name.clone(), Column::content(run, content)?)));
+        let mut groups = vec![
             Group { name: "amount", fields: named(amounts.collect()) },
             Group { name: "concentration", fields: named(concentrations.collect()) },
             Group { name: "property", fields: properties.map(|c| (split(run, c.name).1.to_owned(), c)).collect() },
+            Group { name: "solid", fields: solids.collect() },
         ];
+        groups.retain(|group| group.name != "solid" || !group.fields.is_empty());
         topics.push(Topic {
             topic: format!("/contents/{}", instance.name),
             schema: format!("matterix.Contents.{}", instance.name),

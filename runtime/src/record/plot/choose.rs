@@ -201,11 +201,12 @@ fn contents(run: &Run<'_>, mixture: &Mixture) -> Vec<Panel> {
     } else {
         given.collect()
     };
-    let species = mixture.contents.iter().map(|c| model.species.get(c.species as usize));
+    let species = mixture.contents.iter().map(|c| Some((model.species.get(c.species as usize)?, model.is_solid(c))));
     let mut groups: Vec<(&str, Vec<Series>)> = Vec::new();
     for (species, column) in species.zip(columns) {
-        let Some((species, column)) = species.zip(column) else { continue };
-        let Some(line) = series(species.name.clone(), &column, 0, false) else { continue };
+        let Some(((species, solid), column)) = species.zip(column) else { continue };
+        let name = if solid { format!("{} (solid)", species.name) } else { species.name.clone() };
+        let Some(line) = series(name, &column, 0, false) else { continue };
         match groups.iter_mut().find(|(symbol, _)| *symbol == column.symbol()) {
             Some((_, list)) => list.push(line),
             None => groups.push((column.symbol(), vec![line])),

@@ -96,7 +96,8 @@ fn container(run: &Run<'_>, mixture: &Mixture) -> ContainerReport {
 fn content(run: &Run<'_>, content: &Content, concentration: Option<u32>) -> Option<SpeciesReport> {
     let species = run.program.model.species.get(content.species as usize)?;
     let settled = content.settled.and_then(|i| run.recording.observables.get(i as usize)?.first());
-    let amount = end(settled.or_else(|| run.recording.states.get(content.state as usize))?);
+    let put = end(run.recording.states.get(content.state as usize)?);
+    let amount = settled.map_or(put, end);
     let of = |index: u32| {
         let observable = run.program.model.observables.get(index as usize)?;
         let (_, value) = run.recording.observables.get(index as usize)?.first()?.last()?;
@@ -108,6 +109,8 @@ fn content(run: &Run<'_>, content: &Content, concentration: Option<u32>) -> Opti
         formula: species.formula.clone(),
         amount: (!species.by_mass).then_some(amount),
         mass: amount * species.molar_mass * 1000.0,
+        put: settled.map(|_| put),
+        solid: settled.map(|_| run.program.model.is_solid(content)),
         concentration,
         concentration_unit,
     })

@@ -105,8 +105,12 @@ fn containers(report: &Report) -> Option<String> {
 }
 
 fn container(container: &ContainerReport) -> Option<String> {
-    let mut table = Table::new(&[Left, Right, Right, Right]);
-    for species in container.species.iter().filter(|s| s.mass != 0.0) {
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Left]);
+    let there = |s: &&super::SpeciesReport| s.mass != 0.0 || s.put.is_some_and(|put| put != 0.0);
+    if container.species.iter().filter(there).any(|s| s.put.is_some()) {
+        table.row(["", "at equilibrium", "", "", "put in"]);
+    }
+    for species in container.species.iter().filter(there) {
         let amount = species.amount.map(amount).unwrap_or_default();
         let weight = mass(species.mass);
         // What rounding left of a used-up species is shown as none.
@@ -114,7 +118,10 @@ fn container(container: &ContainerReport) -> Option<String> {
         let concentration = species
             .concentration
             .map(|c| if gone { "0".into() } else { quantity_short(c, &species.concentration_unit) });
-        table.row([format!("  {}", species.name), amount, weight, concentration.unwrap_or_default()]);
+        let put = species.put.map(self::amount).unwrap_or_default();
+        let solid = if species.solid == Some(true) && !gone { "solid" } else { "" };
+        let row = [format!("  {}", species.name), amount, weight, concentration.unwrap_or_default(), put];
+        table.row(row.into_iter().chain([solid.to_owned()]));
     }
     let body = table.print();
     if body.is_empty() {
@@ -125,7 +132,8 @@ fn container(container: &ContainerReport) -> Option<String> {
         let values = if values.len() == 1 { values.concat() } else { format!("({})", values.join(", ")) };
         format!("{} {values}{}{}", p.name, if p.unit.is_empty() { "" } else { " " }, p.unit)
     };
-    let properties: Vec<String> = container.properties.iter().map(show).collect();
+    let known = |p: &&super::PropertyReport| p.values.iter().all(|v| v.is_finite());
+    let properties: Vec<String> = container.properties.iter().filter(known).map(show).collect();
     let line = if properties.is_empty() { String::new() } else { format!(": {}", properties.join(", ")) };
     Some(format!("  {}{line}\n{body}", container.name))
 }

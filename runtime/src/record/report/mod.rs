@@ -189,6 +189,12 @@ pub struct SpeciesReport {
     pub amount: Option<f64>,
     /// g.
     pub mass: f64,
+    /// mol put in, where an equilibrium says how much of it there is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub put: Option<f64>,
+    /// Whether it is a solid beside the solution, where an equilibrium says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solid: Option<bool>,
     /// As the library defines it.
     pub concentration: Option<f64>,
     /// Of the concentration.
