@@ -6,9 +6,6 @@ use matterix_ir::equilibrium::{Layout, Part, Phase, System};
 
 const LN_10: f64 = std::f64::consts::LN_10;
 
-/// An amount below this share of the solvent is none.
-const TRACE: f64 = 1e-27;
-
 /// By how much a solution is off.
 #[derive(Clone, Copy, Default)]
 pub struct Gaps {
@@ -58,8 +55,8 @@ fn atoms(formula: &str) -> BTreeMap<String, f64> {
     open.pop().unwrap_or_default()
 }
 
-/// By how much the solution of a system is off; none where there is none.
-pub fn gaps(system: &System, args: &[f64], elements: &[Vec<f64>]) -> Option<Gaps> {
+/// By how much the solution of a system is off; none where there is none. An amount below a share `trace` of the solvent is none.
+pub fn gaps(system: &System, args: &[f64], elements: &[Vec<f64>], trace: f64) -> Option<Gaps> {
     let layout = system.layout();
     let members = system.members();
     let part = |part| Some(system.value(part, args)).filter(|v: &f64| v.is_finite());
@@ -96,7 +93,7 @@ pub fn gaps(system: &System, args: &[f64], elements: &[Vec<f64>]) -> Option<Gaps
         let absent: Vec<usize> = involved
             .iter()
             .copied()
-            .filter(|i| amounts[*i] <= TRACE * amounts[0] && members[*i].phase != Phase::Formal)
+            .filter(|i| amounts[*i] <= trace * amounts[0] && members[*i].phase != Phase::Formal)
             .collect();
         let off = match absent.as_slice() {
             [] => (product - k).abs(),

@@ -19,12 +19,14 @@ struct Bounds {
     failed: u64,
     equations: f64,
     kept: f64,
+    /// Below this share of the solvent an amount is none.
+    trace: f64,
 }
 
-const ACIDS: Bounds = Bounds { failed: 0, equations: 1e-10, kept: 1e-12 };
+const ACIDS: Bounds = Bounds { failed: 0, equations: 1e-10, kept: 1e-12, trace: 1e-27 };
 
 /// Where half-cells leave the potential open, beyond what rounding tells, there may be no solution; it is never another one.
-const HALF_CELLS: Bounds = Bounds { failed: 2, equations: 1e-6, kept: 1e-11 };
+const HALF_CELLS: Bounds = Bounds { failed: 2, equations: 1e-6, kept: 1e-9, trace: 1e-12 };
 
 fn main() -> Result<(), String> {
     let args: Vec<String> = std::env::args().collect();
@@ -65,7 +67,7 @@ fn random(of: &str, count: u64, chemistry: Chemistry, bounds: &Bounds) -> Result
     let mut failed = Vec::new();
     for seed in 0..count {
         let args = mixture(seed, &ready);
-        let Some(found) = judge::gaps(&ready.0, &args, &elements) else {
+        let Some(found) = judge::gaps(&ready.0, &args, &elements, bounds.trace) else {
             failed.push(seed);
             continue;
         };

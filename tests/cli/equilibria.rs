@@ -176,3 +176,45 @@ fn a_database_that_cannot_be_read_leaves_nothing_behind() {
     assert_eq!(matterixc_in(&dir, &["import", "phreeqc", "absent.dat"]).code, 2);
     assert_eq!(matterixc_in(&dir, &["import", "gems", "wrong.dat"]).code, 2);
 }
+
+#[test]
+fn half_cells_take_up_what_others_give() {
+    let dir = folder("half-cells");
+    let iron =
+        format!("{WATER}\nuse std::half_cells::Ag(s)\nequilibrium iron: Fe3+ + e- <-> Fe2+ {{ potential: 0.771 V }}");
+    let ran = |name: &str, text: String| {
+        write(&dir, name, text);
+        matterixc_in(&dir, &["run", name])
+    };
+    let expected = "    expect redox_potential(cup.contents) in 0.770 V .. 0.772 V\n";
+    let half = cup(&iron, "100 g of water + 1 umol of Fe2+ + 1 umol of Fe3+ + 5 umol of Cl-", expected);
+    let half = ran("half.mtx", half.replace("debye_hueckel", "ideal").replace("use std::half_cells::Ag(s)\n", ""));
+    assert_eq!(half.code, 0, "{}{}", half.out, half.err);
+    // Cerium with its potential in sulfuric acid oxidises all the iron that it can.
+    let cerium = "species Ce3+ { formula: \"Ce^3+\", molar_volume: 0 mL/mol, heat_capacity: 0 J/(mol*K) }
+species Ce4+ { formula: \"Ce^4+\", molar_volume: 0 mL/mol, heat_capacity: 0 J/(mol*K) }
+equilibrium iron: Fe3+ + e- <-> Fe2+ { potential: 0.771 V }
+equilibrium cerium: Ce4+ + e- <-> Ce3+ { potential: 1.44 V }";
+    let titrated = "    expect cup.contents.amount[Fe3+] in 0.9999 umol .. 1.0001 umol
+    expect redox_potential(cup.contents) in 1.43 V .. 1.45 V\n";
+    let done = cup(cerium, "100 g of water + 1 umol of Fe2+ + 2 umol of Ce4+ + 10 umol of Cl-", titrated);
+    let done = ran("done.mtx", done.replace("debye_hueckel", "ideal"));
+    assert_eq!(done.code, 0, "{}{}", done.out, done.err);
+    // A potential is that of a reduction; a reaction has no electrons; nothing holds any.
+    let wrong = [
+        (cup("equilibrium iron: Fe2+ <-> Fe3+ + e- { potential: 0.771 V }", "100 g of water", ""), "equilibrium-form"),
+        (cup("reaction iron: Fe3+ + e- -> Fe2+ { rate: 1 1/s }", "100 g of water", ""), "equilibrium-form"),
+        (cup("", "100 g of water + 1 mmol of e-", ""), "equilibrium-form"),
+    ];
+    for (text, code) in wrong {
+        write(&dir, "wrong.mtx", text);
+        let checked = matterixc_in(&dir, &["check", "--no-cache", "wrong.mtx"]);
+        assert_eq!(checked.code, 1, "{code}: {}{}", checked.out, checked.err);
+        assert!(
+            flat(&checked.err).contains(code) || flat(&checked.out).contains(code),
+            "{code}: {}{}",
+            checked.out,
+            checked.err
+        );
+    }
+}

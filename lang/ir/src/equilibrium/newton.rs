@@ -194,7 +194,7 @@ impl Problem<'_> {
 }
 
 /// The largest magnitude; not a number where one is none.
-fn largest(values: &[f64]) -> f64 {
+pub(super) fn largest(values: &[f64]) -> f64 {
     let nan_or = |most: f64, v: f64| if most.is_nan() || v.is_nan() { f64::NAN } else { most.max(v) };
     values.iter().map(|v| v.abs()).fold(0.0, nan_or)
 }

@@ -20,6 +20,9 @@ pub(super) const LN_10: f64 = std::f64::consts::LN_10;
 /// The temperature at which constants and the coefficients of activity are given, where nothing else is said, K.
 pub const STANDARD: f64 = 298.15;
 
+/// What no equation changes is kept to this share of its largest part, or there is no solution.
+const KEPT: f64 = 1e-9;
+
 /// How often a temperature is halved that is hard to find.
 const HALVINGS: usize = 40;
 
@@ -217,6 +220,7 @@ fn finish(
     };
     let point = Point { basis, x, totals, state };
     reach_down(problem, &mut solution, &point, lacking)?;
+    keeps_all(problem, &solution).then_some(())?;
     solution.point = Some(point);
     Some(solution)
 }
@@ -244,6 +248,21 @@ fn reach_down(problem: &Problem<'_>, solution: &mut Solution, point: &Point, lac
         *amount = if is_absent { 0.0 } else { *amount + problem.growth(&step, &point.state, i) };
     }
     Some(())
+}
+
+/// Whether what no equation changes is there as it was given, and nothing below zero that was not: a last look at what leaves here.
+fn keeps_all(problem: &Problem<'_>, solution: &Solution) -> bool {
+    let free = &problem.system.basis;
+    let mut rows = vec![(0.0_f64, 0.0_f64); free.masters.len() + 1];
+    for (i, amount) in solution.amounts.iter().enumerate() {
+        let given = problem.given(i);
+        for (row, part) in free.parts.row(i) {
+            let (gap, size) = &mut rows[*row];
+            *gap += part * (amount - given);
+            *size = size.max((part * amount).abs()).max((part * given).abs());
+        }
+    }
+    rows.iter().all(|(gap, size)| gap.abs() <= KEPT * size + f64::MIN_POSITIVE)
 }
 
 enum Change {

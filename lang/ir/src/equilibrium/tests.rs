@@ -288,6 +288,12 @@ fn ions_of_several_atoms_are_solved() {
     }
 }
 
+#[test]
+fn what_is_no_number_is_not_met() {
+    assert!(newton::largest(&[1.0, f64::NAN, 0.0]).is_nan());
+    assert_eq!(newton::largest(&[1.0, -3.0, 0.0]), 3.0);
+}
+
 /// Half-cells, with log10 K from potentials in V.
 fn half_cells() -> Sketch {
     let log = |electrons: f64, potential: f64| electrons * potential / 0.059_159_6;

@@ -1,5 +1,7 @@
 //! What names stand for where contents are given.
 
+use matterix_ir::{Diagnostic, codes};
+
 use super::Elaborator;
 use crate::ast::Name;
 use crate::declare::SpeciesId;
@@ -19,6 +21,12 @@ impl Elaborator<'_> {
         let names = self.tables.names;
         let id = names.lookup(module, &name.text);
         if let Some(s) = id.and_then(|id| self.tables.species.of_decl(id)) {
+            if self.tables.species.get(s).is_electron {
+                let headline = format!("nothing holds `{}`: electrons are formal", name.text);
+                let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, name.span, headline, "stands in half-cells alone");
+                self.report(d.help("give what takes up electrons, or gives them: Fe3+, or Fe2+"));
+                return None;
+            }
             return Some(Substance::Species(s));
         }
         let is_solution = |k: &crate::ast::ItemKind| matches!(k, crate::ast::ItemKind::Solution { .. });
