@@ -405,13 +405,21 @@ mod tests {
     #[test]
     fn no_two_substances_of_the_library_share_a_number_a_name_or_a_structure() {
         let catalogue = Catalogue::read(&[]);
-        let mut seen: BTreeMap<String, &str> = BTreeMap::new();
+        let mut seen: BTreeMap<(&str, &str), &str> = BTreeMap::new();
+        let mut structures: BTreeMap<String, Vec<(&str, Structure)>> = BTreeMap::new();
         for s in catalogue.all() {
-            for key in s.names().map(str::to_string).chain(s.cas.clone()).chain(s.smiles.clone()) {
-                assert_eq!(seen.insert(key.clone(), &s.name), None, "{key}");
+            let number = s.cas.as_deref().map(|cas| ("number", cas));
+            for key in s.names().map(|name| ("name", name)).chain(number) {
+                assert_eq!(seen.insert(key, &s.name), None, "{key:?}");
             }
-            let right = s.cas.as_deref().is_none_or(check_digit_holds);
-            assert!(right, "{} {:?}", s.name, s.cas);
+            assert!(s.cas.as_deref().is_none_or(check_digit_holds), "{} {:?}", s.name, s.cas);
+            let Some(structure) = s.smiles.as_deref().and_then(|smiles| Structure::parse(smiles).ok()) else {
+                continue;
+            };
+            let same = structures.entry(format!("{:?}", structure.formula)).or_default();
+            let twin = same.iter().find(|(_, other)| *other == structure);
+            assert!(twin.is_none(), "{} is {}", s.name, twin.map_or("", |(name, _)| name));
+            same.push((&s.name, structure));
         }
         assert!(catalogue.all().len() >= 400, "{}", catalogue.all().len());
     }
