@@ -459,6 +459,8 @@ def choose_density(by):
             return crc, "crc", by["cas"], "cas"
         off = {s: abs(by[s] / by_atoms - 1) for s in ("crc", "cas") if by[s]}
         near = 0.12 if len(off) == 1 else 0.08
+        if len(off) == 2 and abs(crc / by["cas"] - 1) < 0.1:
+            return None
         likely = [(s, by[s]) for s in off if off[s] <= near]
         return (likely[0][1], likely[0][0], None, None) if len(likely) == 1 else None
     if by["cas"] and warm:
@@ -562,8 +564,11 @@ def main():
                 # Some have no melting point below 1 atm: they sublime.
                 boils = choose("boiling_point", found["boiling_point"])
                 fits["gas"] = lambda t: boils is not None and t < boils[0]
-            if got and what == "melting_point" and got[3] is None and got[0] > 1500:
-                # Whether it melts at all, or sublimes, is not sure then.
+            if got and what == "melting_point" and got[3] is None and not (mol is not None and is_organic(mol)):
+                # Whether it melts at all, decomposes or sublimes is not sure then.
+                got = None
+            if got and what == "boiling_point" and got[3] is None and got[1] not in ("crc", "nist"):
+                # It may be that at a lower pressure.
                 got = None
             if got and what == "melting_point" and not fits[phase](got[0]):
                 say(f"melting point {got[0]:.5g} of {got[1]} is not that of a {phase}")

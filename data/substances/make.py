@@ -185,13 +185,25 @@ def substances():
     return out, dropped, wrong
 
 
+def usual(row, formula):
+    """A formula as its name or alias has it, `OsO4`, where that has the same atoms."""
+    for word in [row["name"], *row["aliases"].split()]:
+        if re.fullmatch(r"(?:[A-Z][a-z]?\d*)+", word):
+            try:
+                if atoms(word) == atoms(formula):
+                    return word
+            except ValueError:
+                pass
+    return formula
+
+
 def entry(row, ids, by):
     """The text of a substance with its other names."""
     out = f"/// {row['title']}.\nspecies {row['name']} {{\n"
     if ids["smiles"]:
         smiles = ids["smiles"].replace("\\", "\\\\")
         out += f'    smiles: "{smiles}"\n'
-    out += f'    formula: "{ids["formula"]}"\n    cas: "{row["cas"]}"\n    phase: "{ids["phase"]}"\n'
+    out += f'    formula: "{usual(row, ids["formula"])}"\n    cas: "{row["cas"]}"\n    phase: "{ids["phase"]}"\n'
     out += "".join(by[what].line() for what in ORDER if what in by)
     if row["groups"]:
         out += f"    reactive_groups: [{row['groups'].replace(' ', ', ')}]\n"

@@ -104,14 +104,16 @@ const WORDS: &[&str] = &["phase", "hazards", "dissolves", "reactive_groups", "by
 impl Catalogue {
     /// Reads the library, and files by their paths and texts.
     pub fn read(files: &[(String, String)]) -> Catalogue {
-        let library = library::MODULES.iter().map(|m| (m.name.to_string(), m.text.to_string(), false));
-        let own = files.iter().map(|(path, text)| (path.clone(), text.clone(), true));
-        let read = |(module, text, is_file): (String, String, bool)| {
-            let (tree, _) = syntax::parse(FileId(0), &text);
-            Text { module, text, tree, is_file }
-        };
+        let own = files.iter().map(|(path, text)| {
+            let (tree, _) = syntax::parse(FileId(0), text);
+            Text { module: path.clone(), text: text.clone(), tree, is_file: true }
+        });
+        let library = library::MODULES.iter().enumerate().map(|(index, module)| {
+            let tree = library::tree(index);
+            Text { module: module.name.to_string(), text: module.text.to_string(), tree, is_file: false }
+        });
         // Files come first: what they declare hides the library's.
-        let texts: Vec<Text> = own.chain(library).map(read).collect();
+        let texts: Vec<Text> = own.chain(library).collect();
         let everywhere = prelude(&texts);
         let mut all: Vec<Substance> = texts.iter().flat_map(|text| of_text(text, &everywhere)).collect();
         take_part(&texts, &mut all);
@@ -133,10 +135,12 @@ impl Catalogue {
             by,
             substances: self.all.iter().filter(|s| fits(s)).collect(),
         };
+        // `CO` is no other writing of `Co`.
+        let exact = self.all.iter().any(|s| s.names().any(|name| name == word));
         let mut found = vec![
             by("name", &|s| s.names().any(|name| name == word)),
             by("CAS number", &|s| s.cas.as_deref() == Some(word)),
-            by("name", &|s| s.names().chain([s.title()]).any(|name| self::plain(name) == plain)),
+            by("name", &|s| !exact && s.names().chain([s.title()]).any(|name| self::plain(name) == plain)),
             by("formula", &|s| formula.is_some() && s.composition() == formula),
             by("structure", &|s| structure.as_ref().is_some_and(|asked| s.is(asked))),
         ];
@@ -401,13 +405,21 @@ mod tests {
     #[test]
     fn no_two_substances_of_the_library_share_a_number_a_name_or_a_structure() {
         let catalogue = Catalogue::read(&[]);
-        let mut seen: BTreeMap<String, &str> = BTreeMap::new();
+        let mut seen: BTreeMap<(&str, &str), &str> = BTreeMap::new();
+        let mut structures: BTreeMap<String, Vec<(&str, Structure)>> = BTreeMap::new();
         for s in catalogue.all() {
-            for key in s.names().map(str::to_string).chain(s.cas.clone()).chain(s.smiles.clone()) {
-                assert_eq!(seen.insert(key.clone(), &s.name), None, "{key}");
+            let number = s.cas.as_deref().map(|cas| ("number", cas));
+            for key in s.names().map(|name| ("name", name)).chain(number) {
+                assert_eq!(seen.insert(key, &s.name), None, "{key:?}");
             }
-            let right = s.cas.as_deref().is_none_or(check_digit_holds);
-            assert!(right, "{} {:?}", s.name, s.cas);
+            assert!(s.cas.as_deref().is_none_or(check_digit_holds), "{} {:?}", s.name, s.cas);
+            let Some(structure) = s.smiles.as_deref().and_then(|smiles| Structure::parse(smiles).ok()) else {
+                continue;
+            };
+            let same = structures.entry(format!("{:?}", structure.formula)).or_default();
+            let twin = same.iter().find(|(_, other)| *other == structure);
+            assert!(twin.is_none(), "{} is {}", s.name, twin.map_or("", |(name, _)| name));
+            same.push((&s.name, structure));
         }
         assert!(catalogue.all().len() >= 400, "{}", catalogue.all().len());
     }

@@ -34,6 +34,11 @@ pub fn read(index: usize, file: FileId) -> (ast::File, Vec<Diagnostic>) {
     }
 }
 
+/// The tree of a module, with spans in its text.
+pub fn tree(index: usize) -> ast::File {
+    read(index, FileId(FIRST + index as u32)).0
+}
+
 /// Whether a file is a module of the library, where the user's own file is the first.
 pub fn is_module(file: FileId) -> bool {
     (FIRST..FIRST + MODULES.len() as u32).contains(&file.0)

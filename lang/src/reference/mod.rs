@@ -57,7 +57,9 @@ pub fn assets() -> String {
 /// The species of the library, a line for each module that declares some.
 pub fn species() -> String {
     let library = Library::read();
-    library.modules.iter().map(tables::species_list).collect()
+    let everywhere = library.prelude();
+    let list = |m: &Module| tables::species_list(m, everywhere.iter().any(|name| name == m.short()));
+    library.modules.iter().map(list).collect()
 }
 
 /// The modules of the library with what several pages ask for.

@@ -156,14 +156,15 @@ pub fn species(module: &Module) -> String {
     table(&["species", "formula", "density or volume", "heat capacity", "also", "source"], &rows)
 }
 
-/// The names of the species of a module on one line.
-pub fn species_list(module: &Module) -> String {
+/// The names of the species of a module on one line, with the import that brings them unless they are there in every file.
+pub fn species_list(module: &Module, everywhere: bool) -> String {
     let names = module.tree.items.iter().filter_map(|item| match &item.kind {
         ItemKind::Species { name, .. } => Some(name.text.as_str()),
         _ => None,
     });
     let names = names.collect::<Vec<_>>();
-    if names.is_empty() { String::new() } else { format!("{}\n", super::markdown::codes(names)) }
+    let import = if everywhere { String::new() } else { format!("With `use {}`: ", module.name) };
+    if names.is_empty() { String::new() } else { format!("{import}{}\n", super::markdown::codes(names)) }
 }
 
 /// Solutions and reactions.
