@@ -81,6 +81,8 @@ pub enum Command {
     Lsp(LspArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
+    /// Say what the library knows of a substance, and where each number comes from.
+    Substance(SubstanceArgs),
     /// Offer check, fix, run and the rest to an assistant, over the Model Context Protocol on standard input and output.
     Mcp(McpArgs),
     /// Create a small project that checks, runs and passes.
@@ -668,6 +670,28 @@ pub struct ExplainArgs {
     /// Print the index of the pages.
     #[arg(long, hide = true)]
     pub index: bool,
+}
+
+/// `matterixc substance`.
+#[derive(Debug, Args)]
+pub struct SubstanceArgs {
+    /// A name, a formula, a CAS number or a SMILES: `acetone`, `C3H6O`, `67-64-1`, `CC(C)=O`.
+    pub name: String,
+    /// Also look among the species of this file.
+    #[arg(long, value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    /// Form of the answer.
+    #[arg(long, value_enum, default_value_t = SubstanceFormat::Human)]
+    pub format: SubstanceFormat,
+}
+
+/// Form of what is known of a substance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SubstanceFormat {
+    /// A page to read.
+    Human,
+    /// One JSON object, described in docs/substances.md.
+    Json,
 }
 
 /// `matterixc new`.

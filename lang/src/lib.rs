@@ -6,6 +6,7 @@
 //! [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
 
 mod calibration;
+pub mod catalogue;
 pub mod check;
 pub mod chem;
 pub mod declare;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use matterix_ir::{Diagnostic, FileId, Sources, codes};
 
-use crate::ast::ItemKind;
+use crate::ast::{File, ItemKind};
 use crate::declare::units::declare;
 use crate::loader::Loader;
 use crate::names::{Module, Names, module_candidates, used};
@@ -64,6 +64,13 @@ pub fn load(
     }
     session.tidy(&package);
     let used = used(&modules);
+    for (index, module) in modules.iter_mut().take(library::MODULES.len()).enumerate() {
+        if used[index] && !library::MODULES[index].apart.is_empty() {
+            let (read, found) = session.apart(index, module.file);
+            *module = read;
+            diagnostics.extend(found);
+        }
+    }
     for (module, _) in modules.iter_mut().zip(used).filter(|(module, used)| *used && import::reads(&module.tree)) {
         let (made, found) = session::imported(session, module, loader);
         *module = made;
@@ -94,7 +101,11 @@ fn library(
         let first = session.module(sources, package, "", root);
         return (session.library.clone(), Vec::new(), first);
     }
-    let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
+    let tree = |(index, file): (usize, &FileId)| match library::MODULES[index].apart {
+        [] => library::read(index, *file),
+        _ => (File { version: None, docs: Vec::new(), items: Vec::new() }, Vec::new()),
+    };
+    let read = || -> Vec<_> { files.iter().enumerate().map(tree).collect() };
     let (trees, first) = std::thread::scope(|scope| {
         let reading = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, read);
         let first = session.module(sources, package, "", root);

@@ -62,6 +62,7 @@ mod spills;
 mod stopped;
 mod strict;
 mod studies;
+mod substance;
 mod tempo;
 mod time;
 mod together;

@@ -32,7 +32,11 @@ impl Import {
 impl Names<'_> {
     /// The import that a module lacks for a name which another one declares for what `fits`.
     pub fn import_of(&self, into: usize, name: &str, fits: impl Fn(&ItemKind) -> bool) -> Option<Import> {
-        let all = self.declaring(name).filter(|(_, id)| fits(&self.decl(*id).item.kind));
+        let unread =
+            || ItemKind::Species { name: Name { text: name.to_string(), span: Span::default() }, fields: Vec::new() };
+        let all = self
+            .declaring(name)
+            .filter(|(_, id)| id.map_or_else(|| fits(&unread()), |id| fits(&self.decl(id).item.kind)));
         let mut all = all.map(|(module, _)| module).filter(|module| !module.name.is_empty());
         let module = all.next()?.name.clone();
         let only = all.next().is_none();

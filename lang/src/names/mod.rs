@@ -8,7 +8,7 @@ use std::sync::Arc;
 use matterix_ir::{Diagnostic, FileId, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
-use crate::near;
+use crate::{library, near};
 
 /// A module: one file.
 #[derive(Clone, Debug)]
@@ -255,7 +255,8 @@ impl<'a> Names<'a> {
         }
         let front = front.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
         if let Some(from) = self.module_index(&front) {
-            return (!self.own[from].contains_key(name.text.as_str())).then(|| self.not_in_module(name, from));
+            let declared = self.declaring(&name.text).any(|(module, _)| module.name == front);
+            return (!declared).then(|| self.not_in_module(name, from));
         }
         let near = near::nearest(&front, self.modules.iter().map(|m| &m.name));
         let headline = format!("there is no module `{front}` here");
@@ -311,10 +312,14 @@ impl<'a> Names<'a> {
         self.declaring(name).next().map(|(module, _)| module.name.as_str())
     }
 
-    /// The modules that declare a name, with what they declare.
-    fn declaring(&self, name: &str) -> impl Iterator<Item = (&Module, DeclId)> {
+    /// The modules that declare a name, with what they declare; a module that was not read declares a species.
+    fn declaring(&self, name: &str) -> impl Iterator<Item = (&Module, Option<DeclId>)> {
         let all = self.modules.iter().zip(&self.own);
-        all.filter_map(move |(module, own)| Some((&**module, *own.get(name)?)))
+        all.filter_map(move |(module, own)| match own.get(name) {
+            Some(id) => Some((&**module, Some(*id))),
+            None if own.is_empty() => library::apart(&module.name).contains(&name).then_some((&**module, None)),
+            None => None,
+        })
     }
 
     /// The item of a kind, called `what`, that a path names as a module sees it.

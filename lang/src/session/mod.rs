@@ -12,9 +12,9 @@ use std::sync::Arc;
 
 use matterix_ir::{Diagnostic, FileId, Sources};
 
-use crate::ast;
 use crate::names::Module;
 use crate::syntax::{self, Memo};
+use crate::{ast, library};
 
 pub use foreseen::Foreseen;
 
@@ -30,6 +30,8 @@ const MOST: usize = 8;
 pub struct Session {
     /// The library's modules, where the file that is checked comes first.
     pub(crate) library: Vec<Arc<Module>>,
+    /// Those of them that are read only where a file imports them.
+    apart: Vec<Arc<Module>>,
     /// By the name of the file that is checked; the last one was checked last.
     packages: Vec<(String, Package)>,
     /// Modules whose assets come from files.
@@ -114,6 +116,19 @@ impl Session {
         let header = syntax::header_end(&source.text);
         let module = Arc::new(Module { name: name.to_string(), file, tree, header });
         text.read = Some((source.text.clone(), module.clone(), found.clone()));
+        (module, found)
+    }
+
+    /// A module of the library that stands apart, read now that a file imports it.
+    pub(crate) fn apart(&mut self, index: usize, file: FileId) -> (Arc<Module>, Vec<Diagnostic>) {
+        let name = library::MODULES[index].name;
+        if let Some(known) = self.apart.iter().find(|module| module.name == name && module.file == file) {
+            return (known.clone(), Vec::new());
+        }
+        let (tree, found) = library::read(index, file);
+        let module = Arc::new(Module { name: name.to_string(), file, tree, header: 0 });
+        self.apart.retain(|known| known.name != name);
+        self.apart.push(module.clone());
         (module, found)
     }
 

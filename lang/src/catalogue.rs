@@ -1,0 +1,422 @@
+//! Substances as texts declare them: names, structures, and every number with the source that is told beside it.
+//!
+//! A source is a tag in a comment at the end of the line, `// [crc]`, which the module's documentation explains; what stands after it is a
+//! remark on this number. Numbers without a tag have the source that the documentation of the species tells.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::{FileId, Span};
+
+use crate::ast::{ExprKind, Field, FieldValue, File, Item, ItemKind, Term};
+use crate::chem::{Formula, Structure};
+use crate::{library, near, syntax};
+
+/// A text with what it declares.
+struct Text {
+    /// `std::species`; a file has its path.
+    module: String,
+    text: String,
+    tree: File,
+    is_file: bool,
+}
+
+/// Where a number comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// `crc`; none where the documentation of the species tells it.
+    pub tag: Option<String>,
+    /// In full, as the module or the species tells it.
+    pub text: String,
+    /// What is said of this number: `within 4 %`, `alone`.
+    pub remark: String,
+}
+
+/// A property as stated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stated {
+    /// `boiling_point`.
+    pub property: String,
+    /// As written: `56.1 degC`.
+    pub value: String,
+    /// Where a number has one.
+    pub source: Option<Source>,
+    /// Whether it holds a number, which should have a source.
+    pub is_number: bool,
+}
+
+/// An equilibrium in which a substance takes part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Its name.
+    pub name: String,
+    /// As written: `acetic_acid <-> H+ + acetate`.
+    pub equation: String,
+    /// Its module, or file.
+    pub module: String,
+}
+
+/// A substance with all that is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Substance {
+    /// As declared.
+    pub name: String,
+    /// Its other names.
+    pub aliases: Vec<String>,
+    /// Its documentation.
+    pub about: String,
+    /// Its module, or file.
+    pub module: String,
+    /// What a file writes to have it: none of the library where it is there in every file, and none of a file's own.
+    pub import: Option<String>,
+    /// As written.
+    pub formula: Option<String>,
+    /// kg/mol.
+    pub molar_mass: Option<f64>,
+    /// Registry number.
+    pub cas: Option<String>,
+    /// Its structure, as written.
+    pub smiles: Option<String>,
+    /// Its properties, in order.
+    pub stated: Vec<Stated>,
+    /// The equilibria in which it takes part.
+    pub equilibria: Vec<Part>,
+}
+
+/// What a search found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found<'a> {
+    /// By what: `name`, `CAS number`, `formula`, `structure`.
+    pub by: &'static str,
+    /// All that fit.
+    pub substances: Vec<&'a Substance>,
+}
+
+/// The substances of the library, and of files.
+pub struct Catalogue {
+    all: Vec<Substance>,
+}
+
+/// Fields that are shown by themselves, or say what a species is without a number.
+const IDENTITY: &[&str] = &["smiles", "formula", "cas"];
+/// Fields in which digits are no measured numbers.
+const WORDS: &[&str] = &["phase", "hazards", "dissolves", "reactive_groups", "by", "same_as"];
+
+impl Catalogue {
+    /// Reads the library, and files by their paths and texts.
+    pub fn read(files: &[(String, String)]) -> Catalogue {
+        let library = library::MODULES.iter().map(|m| (m.name.to_string(), m.text.to_string(), false));
+        let own = files.iter().map(|(path, text)| (path.clone(), text.clone(), true));
+        let read = |(module, text, is_file): (String, String, bool)| {
+            let (tree, _) = syntax::parse(FileId(0), &text);
+            Text { module, text, tree, is_file }
+        };
+        // Files come first: what they declare hides the library's.
+        let texts: Vec<Text> = own.chain(library).map(read).collect();
+        let everywhere = prelude(&texts);
+        let mut all: Vec<Substance> = texts.iter().flat_map(|text| of_text(text, &everywhere)).collect();
+        take_part(&texts, &mut all);
+        Catalogue { all }
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[Substance] {
+        &self.all
+    }
+
+    /// What a word means: a name or alias, a CAS number, a name in other letters or as its documentation has it, a formula, a structure;
+    /// the first of these under which there is something, then the others.
+    pub fn find(&self, word: &str) -> Vec<Found<'_>> {
+        let plain = plain(word);
+        let formula = Formula::parse(word).ok();
+        let structure = Structure::parse(word).ok();
+        let by = |by, fits: &dyn Fn(&Substance) -> bool| Found {
+            by,
+            substances: self.all.iter().filter(|s| fits(s)).collect(),
+        };
+        let mut found = vec![
+            by("name", &|s| s.names().any(|name| name == word)),
+            by("CAS number", &|s| s.cas.as_deref() == Some(word)),
+            by("name", &|s| s.names().chain([s.title()]).any(|name| self::plain(name) == plain)),
+            by("formula", &|s| formula.is_some() && s.composition() == formula),
+            by("structure", &|s| structure.as_ref().is_some_and(|asked| s.is(asked))),
+        ];
+        let mut told: Vec<&str> = Vec::new();
+        for group in &mut found {
+            group.substances.retain(|s| !told.contains(&s.name.as_str()));
+            told.extend(group.substances.iter().map(|s| s.name.as_str()));
+        }
+        found.retain(|group| !group.substances.is_empty());
+        found
+    }
+
+    /// The names that are nearest to a word, at most three.
+    pub fn near(&self, word: &str) -> Vec<String> {
+        near::nearest(word, self.all.iter().flat_map(Substance::names))
+    }
+}
+
+impl Substance {
+    /// Its name and its other ones.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.name.as_str()).chain(self.aliases.iter().map(String::as_str))
+    }
+
+    /// The first sentence of its documentation, without the stop: `Propanone`.
+    pub fn title(&self) -> &str {
+        let line = self.about.split(". ").next().unwrap_or_default();
+        line.trim_end_matches('.')
+    }
+
+    fn composition(&self) -> Option<Formula> {
+        Formula::parse(self.formula.as_deref()?).ok()
+    }
+
+    fn is(&self, asked: &Structure) -> bool {
+        // Structures are compared only where the atoms are the same: that is cheap.
+        let (Some(smiles), Some(own)) = (&self.smiles, self.composition()) else { return false };
+        own == asked.formula && Structure::parse(smiles).is_ok_and(|own| asked.same_where_stated(&own))
+    }
+}
+
+/// A name without capitals, blanks and signs.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
+/// The modules that every file sees.
+fn prelude(texts: &[Text]) -> Vec<String> {
+    let items = texts.iter().filter(|text| text.module == "std::prelude").flat_map(|text| &text.tree.items);
+    let paths = items.filter_map(|item| match &item.kind {
+        ItemKind::Use { path, .. } => {
+            Some(path.segments.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::"))
+        }
+        _ => None,
+    });
+    paths.collect()
+}
+
+fn of_text(text: &Text, everywhere: &[String]) -> Vec<Substance> {
+    let sources = explained(&text.tree.docs);
+    let (mut out, mut aliases): (Vec<Substance>, Vec<(String, String)>) = (Vec::new(), Vec::new());
+    for item in &text.tree.items {
+        let ItemKind::Species { name, fields } = &item.kind else { continue };
+        match field(fields, "same_as") {
+            Some(FieldValue::Expr(expr)) if let ExprKind::Name(of) = &*expr.kind => {
+                aliases.push((of.text.clone(), name.text.clone()));
+            }
+            _ => out.push(substance(text, item, (&name.text, fields), &sources, everywhere)),
+        }
+    }
+    for (of, alias) in aliases {
+        if let Some(known) = out.iter_mut().find(|s| s.name == of) {
+            known.aliases.push(alias);
+        }
+    }
+    out
+}
+
+fn substance(
+    text: &Text,
+    item: &Item,
+    (name, fields): (&str, &[Field]),
+    sources: &BTreeMap<String, String>,
+    everywhere: &[String],
+) -> Substance {
+    let written = |key| {
+        field(fields, key).and_then(|value| match value {
+            FieldValue::Expr(expr) => match &*expr.kind {
+                ExprKind::Text(t) => Some(t.clone()),
+                _ => None,
+            },
+            _ => None,
+        })
+    };
+    let formula = written("formula");
+    let molar_mass = formula.as_deref().and_then(|f| Formula::parse(f).ok()?.molar_mass().ok());
+    let import = !text.is_file && !everywhere.contains(&text.module);
+    let about = item.docs.join(" ");
+    let stated = fields.iter().filter(|f| !IDENTITY.contains(&f.key.text.as_str()));
+    Substance {
+        name: name.to_string(),
+        aliases: Vec::new(),
+        module: text.module.clone(),
+        import: import.then(|| format!("use {}", text.module)),
+        formula,
+        molar_mass,
+        cas: written("cas"),
+        smiles: written("smiles"),
+        stated: stated.map(|f| one(text, f, &about, sources)).collect(),
+        equilibria: Vec::new(),
+        about,
+    }
+}
+
+fn field<'a>(fields: &'a [Field], key: &str) -> Option<&'a FieldValue> {
+    fields.iter().find(|f| f.key.text == key).map(|f| &f.value)
+}
+
+fn one(text: &Text, field: &Field, about: &str, sources: &BTreeMap<String, String>) -> Stated {
+    let property = field.key.text.clone();
+    let whole = part(&text.text, field.span);
+    let value = whole.split_once(':').map_or(whole, |(_, value)| value).trim().to_string();
+    let is_number = !WORDS.contains(&property.as_str()) && value.contains(|c: char| c.is_ascii_digit());
+    let source = is_number
+        .then(|| tagged(&text.text, field.span, sources).or_else(|| told(&property, about, sources)))
+        .flatten();
+    Stated { property, value, source, is_number }
+}
+
+fn part(text: &str, span: Span) -> &str {
+    text.get(span.start as usize..span.end as usize).unwrap_or_default()
+}
+
+/// The source in the comment at the end of the line on which something ends.
+fn tagged(text: &str, span: Span, sources: &BTreeMap<String, String>) -> Option<Source> {
+    let line = text.get(span.end as usize..)?.lines().next()?;
+    let (_, comment) = line.split_once("//")?;
+    let (tag, remark) = comment.trim().strip_prefix('[')?.split_once(']')?;
+    let full = sources.get(tag)?.clone();
+    Some(Source { tag: Some(tag.to_string()), text: full, remark: remark.trim().to_string() })
+}
+
+/// The source of a number that the documentation of its species tells: after the name of the property, after `Source:`, or as a tag.
+fn told(property: &str, about: &str, sources: &BTreeMap<String, String>) -> Option<Source> {
+    let mut words = property.replace('_', " ");
+    words.get_mut(..1)?.make_ascii_uppercase();
+    let after = |start: &str| about.split_once(&format!("{start}: ")).map(|(_, rest)| rest.to_string());
+    let tag = || {
+        let (tag, _) = about.split_once('[')?.1.split_once(']')?;
+        Some((tag.to_string(), sources.get(tag)?.clone()))
+    };
+    match after(&words).or_else(|| after("Source")) {
+        Some(text) => Some(Source { tag: None, text, remark: String::new() }),
+        None => tag().map(|(tag, text)| Source { tag: Some(tag), text, remark: String::new() }),
+    }
+}
+
+/// What the documentation of a module says of tags: ``- `[crc]` CRC Handbook``, with the lines indented below.
+fn explained(docs: &[String]) -> BTreeMap<String, String> {
+    let mut out: BTreeMap<String, String> = BTreeMap::new();
+    let mut last: Option<String> = None;
+    for line in docs {
+        let begun = line.strip_prefix("- `[").and_then(|rest| rest.split_once("]`"));
+        match (begun, &last) {
+            (Some((tag, text)), _) => {
+                out.insert(tag.to_string(), text.trim().to_string());
+                last = Some(tag.to_string());
+            }
+            (None, Some(tag)) if line.starts_with("  ") => {
+                if let Some(text) = out.get_mut(tag) {
+                    text.push(' ');
+                    text.push_str(line.trim());
+                }
+            }
+            _ => last = None,
+        }
+    }
+    out
+}
+
+/// Adds to each substance the equilibria in which it takes part.
+fn take_part(texts: &[Text], all: &mut [Substance]) {
+    for text in texts {
+        for item in &text.tree.items {
+            let ItemKind::Equilibrium { name, reactants, products, .. } = &item.kind else { continue };
+            let (Some(first), Some(last)) = (reactants.first(), products.last()) else { continue };
+            let equation = part(&text.text, Span { end: last.span.end, ..first.span }).to_string();
+            let said = Part { name: name.text.clone(), equation, module: text.module.clone() };
+            let takes = |term: &Term, s: &Substance| s.names().any(|name| name == bare(&term.species.text));
+            for s in all.iter_mut().filter(|s| reactants.iter().chain(products).any(|term| takes(term, s))) {
+                s.equilibria.push(said.clone());
+            }
+        }
+    }
+}
+
+/// A species without the phase that an equation states.
+fn bare(name: &str) -> &str {
+    crate::chem::Phase::split(name).0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Modules whose numbers are measured.
+    const MEASURED: &[&str] = &["std::species", "std::substances"];
+
+    #[test]
+    fn every_number_of_the_library_has_its_source() {
+        let catalogue = Catalogue::read(&[]);
+        let of = |s: &&Substance| MEASURED.contains(&s.module.as_str());
+        let numbers = || {
+            catalogue
+                .all()
+                .iter()
+                .filter(of)
+                .flat_map(|s| s.stated.iter().map(move |v| (s, v)))
+                .filter(|(_, v)| v.is_number)
+        };
+        let lacking: Vec<String> = numbers()
+            .filter(|(_, v)| v.source.is_none())
+            .map(|(s, v)| format!("{}::{} {}: {}", s.module, s.name, v.property, v.value))
+            .collect();
+        assert!(lacking.is_empty(), "{}", lacking.join("\n"));
+        assert!(numbers().count() > 2500, "{}", numbers().count());
+    }
+
+    #[test]
+    fn every_constant_of_an_equilibrium_has_its_source() {
+        let module = library::MODULES.iter().find(|m| m.name == "std::equilibria").expect("it is there");
+        let (tree, _) = syntax::parse(FileId(0), module.text);
+        let sources = explained(&tree.docs);
+        let mut seen = 0;
+        for item in &tree.items {
+            let ItemKind::Equilibrium { name, fields, .. } = &item.kind else { continue };
+            // Where a constant is valid is no number of a source.
+            for field in fields.iter().filter(|f| f.key.text != "valid") {
+                assert!(tagged(module.text, field.span, &sources).is_some(), "{} {}", name.text, field.key.text);
+                seen += 1;
+            }
+        }
+        assert!(seen > 10, "{seen}");
+    }
+
+    #[test]
+    fn a_number_without_a_tag_or_with_an_unknown_one_has_no_source() {
+        let text = "mtx 1\n//! Some.\n//!\n//! - `[crc]` A book,\n//!   on two lines.\n\n/// Acid.\nspecies Ac {\n    formula: \"C2H4O2\"\n    \
+            density: 1 g/mL\n    melting_point: 3 degC  // [abc]\n    boiling_point: 4 degC  // [crc] alone\n}\n";
+        let catalogue = Catalogue::read(&[("own.mtx".to_string(), text.to_string())]);
+        let found = catalogue.find("Ac");
+        let [Found { substances, .. }, ..] = found.as_slice() else { panic!("{found:?}") };
+        let sources: Vec<Option<&Source>> = substances[0].stated.iter().map(|v| v.source.as_ref()).collect();
+        let book = Source {
+            tag: Some("crc".to_string()),
+            text: "A book, on two lines.".to_string(),
+            remark: "alone".to_string(),
+        };
+        assert_eq!(sources, [None, None, Some(&book)]);
+    }
+
+    #[test]
+    fn no_two_substances_of_the_library_share_a_number_a_name_or_a_structure() {
+        let catalogue = Catalogue::read(&[]);
+        let mut seen: BTreeMap<String, &str> = BTreeMap::new();
+        for s in catalogue.all() {
+            for key in s.names().map(str::to_string).chain(s.cas.clone()).chain(s.smiles.clone()) {
+                assert_eq!(seen.insert(key.clone(), &s.name), None, "{key}");
+            }
+            let right = s.cas.as_deref().is_none_or(check_digit_holds);
+            assert!(right, "{} {:?}", s.name, s.cas);
+        }
+        assert!(catalogue.all().len() >= 400, "{}", catalogue.all().len());
+    }
+
+    /// The last digit of a CAS number is the sum of the others, each times its place from the right, modulo 10.
+    fn check_digit_holds(cas: &str) -> bool {
+        let mut digits: Vec<u32> = cas.chars().filter_map(|c| c.to_digit(10)).collect();
+        let Some(last) = digits.pop() else { return false };
+        let sum: u32 = digits.iter().rev().zip(1..).map(|(digit, place)| digit * place).sum();
+        sum % 10 == last && cas.split('-').map(str::len).skip(1).eq([2, 1])
+    }
+}

@@ -1,0 +1,115 @@
+//! `matterixc substance`.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use crate::harness::{flat, folder, matterixc, write};
+
+fn asked(args: &[&str]) -> String {
+    let ended = matterixc(&[&["substance"], args].concat());
+    assert_eq!((ended.code, ended.err.as_str()), (0, ""), "{args:?}");
+    ended.out
+}
+
+#[test]
+fn a_substance_is_found_by_name_alias_formula_number_and_structure() {
+    for word in ["EtOAc", "ethyl_acetate", "Ethyl acetate", "141-78-6", "CCOC(C)=O", "O(CC)C(=O)C"] {
+        let page = asked(&[word]);
+        assert!(page.starts_with("EtOAc\n"), "{word}: {page}");
+    }
+    assert!(asked(&["Na2CO3"]).starts_with("Na2CO3\n"));
+    // The order of atoms in a formula does not matter.
+    assert!(asked(&["COH4N2"]).starts_with("urea\n"));
+}
+
+#[test]
+fn every_number_is_printed_with_its_source_in_full() {
+    let page = asked(&["acetone"]);
+    for line in [
+        "  formula               C3H6O\n",
+        "  molar mass            58.080 g/mol\n",
+        "  CAS                   67-64-1\n",
+        "  boiling point         56.1 degC  [crc]\n",
+        "  flash point           -20 degC  [iec]\n",
+        "  to use it             nothing: every file sees std::species\n",
+    ] {
+        assert!(page.contains(line), "{line}{page}");
+    }
+    assert!(flat(&page).contains("[crc] CRC Handbook of Chemistry and Physics, 95th ed. (2014)"), "{page}");
+    let untagged = asked(&["sucrose"]);
+    assert!(untagged.contains("424.3 J/(mol*K)  (Putnam and Boerio-Goates, J. Chem. Thermodyn. 25 (1993) 607.)"), "{untagged}");
+    let dioxane = asked(&["1,4-dioxane"]);
+    assert!(dioxane.contains("`use std::substances`, or `use std::substances::dioxane`"), "{dioxane}");
+}
+
+#[test]
+fn its_equilibria_are_listed() {
+    let page = asked(&["acetic_acid"]);
+    let line = "  equilibria            acetic_acid_splits: acetic_acid <-> H+ + acetate (std::equilibria)\n";
+    assert!(page.contains(line), "{page}");
+}
+
+#[test]
+fn a_formula_of_several_lists_them_all() {
+    let list = asked(&["C2H6O"]);
+    assert!(list.starts_with("2 substances have the formula `C2H6O`:\n"), "{list}");
+    assert!(list.contains("  EtOH ") && list.contains("  dimethyl_ether  Methoxymethane (std::substances)\n"), "{list}");
+    // A name goes before a structure that is written alike.
+    let both = asked(&["CO"]);
+    assert!(both.starts_with("CO\n") && both.contains("As a structure `CO` is:\n  MeOH "), "{both}");
+}
+
+#[test]
+fn the_answer_is_an_object_for_programs() {
+    let object: Value = serde_json::from_str(&asked(&["67-64-1", "--format", "json"])).expect("it is JSON");
+    assert_eq!((&object["by"], &object["substances"][0]["name"]), (&"CAS number".into(), &"acetone".into()));
+    let properties = object["substances"][0]["properties"].as_array().expect("a list");
+    let density = properties.iter().find(|p| p["property"] == "density").expect("it has one");
+    assert_eq!((&density["value"], &density["source"]["tag"]), (&"0.7845 g/mL".into(), &"crc".into()));
+    assert!(density["source"]["text"].as_str().is_some_and(|t| t.contains("CRC Handbook")), "{density}");
+}
+
+#[test]
+fn an_unknown_name_suggests_near_ones() {
+    let ended = matterixc(&["substance", "dioxan"]);
+    assert_eq!((ended.code, ended.out.as_str()), (1, ""));
+    assert_eq!(ended.err, "error: there is no substance `dioxan`\nhelp: did you mean `dioxane`?\n");
+    let ended = matterixc(&["substance", "qqqqqqqqqqqqqqqqqq"]);
+    assert_eq!(ended.code, 1);
+    assert!(ended.err.contains("help: give a name, a formula, a CAS number or a SMILES"), "{}", ended.err);
+}
+
+#[test]
+fn a_file_brings_its_own_species() {
+    let text = "mtx 1\n//! Ours.\n//!\n//! - `[we]` weighed by us.\n\n/// A dye.\nspecies ours {\n    formula: \"C9H8O4\"\n    density: 1.2 g/mL  // [we]\n}\n";
+    let file = write(&folder("substance"), "own.mtx", text);
+    let page = asked(&["ours", "--file", &file]);
+    assert!(page.contains("1.2 g/mL  [we]\n") && page.contains("  [we] weighed by us.\n"), "{page}");
+    assert!(page.contains(&format!("declared in {file}")), "{page}");
+    assert_eq!(matterixc(&["substance", "ours", "--file", "nothing_here.mtx"]).code, 2);
+}
+
+/// A lab whose beaker holds 10 mL of something.
+fn lab(head: &str, holding: &str) -> String {
+    let mut text = format!("mtx 1\n{head}use std::glassware::Beaker250mL\nlab bench {{\n    ambient: 22 degC\n");
+    writeln!(text, "    table = OpticalTable at (0, 0, 0) m\n    cup = Beaker250mL on table holding {holding}\n}}").expect("text");
+    text + "workflow stay in bench {\n    wait 60 s\n}\n"
+}
+
+#[test]
+fn a_substance_that_is_not_imported_is_offered_with_its_import() {
+    let dir = folder("substance_import");
+    let without = write(&dir, "without.mtx", lab("", "10 mL of dioxane"));
+    let ended = matterixc(&["check", &without]);
+    assert_eq!(ended.code, 1);
+    assert!(flat(&ended.err).contains("it is declared in `std::substances`: add `use std::substances::dioxane`"), "{}", ended.err);
+    assert_eq!(matterixc(&["check", "--fix", &without]).code, 0);
+    let mended = std::fs::read_to_string(&without).expect("it is there");
+    assert!(mended.contains("use std::substances::dioxane\n"), "{mended}");
+    let with = write(&dir, "with.mtx", lab("use std::substances\n", "10 mL of dioxane + 3 g of naphthalene"));
+    assert_eq!(matterixc(&["check", &with]).code, 0);
+    let wrong = write(&dir, "wrong.mtx", lab("use std::substances::dioxan\n", "10 mL of water"));
+    let ended = matterixc(&["check", &wrong]);
+    assert!(flat(&ended.err).contains("did you mean `dioxane`?"), "{}", ended.err);
+}
