@@ -1,6 +1,6 @@
 //! Parses the standard library once, so that no check has to: its trees become part of the program.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::{env, fs, io};
@@ -25,12 +25,23 @@ fn main() -> io::Result<()> {
     for (path, file) in files.iter().zip(FIRST..) {
         trees.push(matterix_syntax::parse(FileId(file), &fs::read_to_string(path)?));
     }
-    let imported: BTreeSet<String> = trees.iter().flat_map(|(tree, _)| imports(tree)).collect();
-    for (path, (tree, found)) in files.iter().zip(trees) {
-        let name =
-            path.file_stem().and_then(|stem| stem.to_str()).ok_or_else(|| io::Error::other("a name that is text"))?;
-        let apart = if imported.contains(name) { None } else { only_species(&tree) }.unwrap_or_default();
-        let bytes = if found.is_empty() { postcard::to_stdvec(&tree).map_err(io::Error::other)? } else { Vec::new() };
+    let names = files.iter().map(|path| path.file_stem().and_then(|stem| stem.to_str()));
+    let names = names.collect::<Option<Vec<_>>>().ok_or_else(|| io::Error::other("a name that is text"))?;
+    let mut tables: BTreeMap<&str, Vec<String>> =
+        names.iter().zip(&trees).filter_map(|(name, (tree, _))| Some((*name, only_matter(tree)?))).collect();
+    // What a module that every file reads imports is read for every file.
+    loop {
+        let others = names.iter().zip(&trees).filter(|(name, _)| !tables.contains_key(*name));
+        let imported: BTreeSet<String> = others.flat_map(|(_, (tree, _))| imports(tree)).collect();
+        let before = tables.len();
+        tables.retain(|name, _| !imported.contains(*name));
+        if tables.len() == before {
+            break;
+        }
+    }
+    for ((path, name), (tree, found)) in files.iter().zip(&names).zip(&trees) {
+        let apart = tables.get(name).cloned().unwrap_or_default();
+        let bytes = if found.is_empty() { postcard::to_stdvec(tree).map_err(io::Error::other)? } else { Vec::new() };
         let ahead = Path::new(&out).join(name).with_extension("tree");
         fs::write(&ahead, bytes)?;
         let text = format!("include_str!({path:?}), tree: include_bytes!({ahead:?}), apart: &{apart:?}");
@@ -49,11 +60,16 @@ fn imports(tree: &File) -> Vec<String> {
     paths.map(|name| name.text.clone()).collect()
 }
 
-/// The names that a module declares, where all of them are species.
-fn only_species(tree: &File) -> Option<Vec<String>> {
+/// The names that a module declares, where it has nothing but species, equilibria, constants, cautions and imports; the prelude, which
+/// only imports, is none.
+fn only_matter(tree: &File) -> Option<Vec<String>> {
     let names = tree.items.iter().map(|item| match &item.kind {
-        ItemKind::Species { name, .. } => Some(name.text.clone()),
+        ItemKind::Species { name, .. } | ItemKind::Equilibrium { name, .. } | ItemKind::Const { name, .. } => {
+            Some(Some(name.text.clone()))
+        }
+        ItemKind::Hazard { .. } | ItemKind::Use { .. } => Some(None),
         _ => None,
     });
-    names.collect()
+    let names: Vec<String> = names.collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
+    (!names.is_empty()).then_some(names)
 }

@@ -14,12 +14,12 @@ pub struct Module {
     pub text: &'static str,
     /// Its tree in postcard's format, with the spans that it has where the user's own file is the first; empty where its text has mistakes.
     tree: &'static [u8],
-    /// The species that it declares, where it declares nothing else and no other module imports it. It is read for files that do: the
-    /// others do not pay for tables of substances.
+    /// The species, equilibria and constants that it declares, where it declares no laws but cautions and no module that every file reads
+    /// imports it. It is read for files that do: the others do not pay for tables of substances.
     pub apart: &'static [&'static str],
 }
 
-/// The species of a module that is read only where a file imports it; none of any other.
+/// What a module declares that is read only where a file imports it; nothing of any other.
 pub fn apart(module: &str) -> &'static [&'static str] {
     MODULES.iter().find(|m| m.name == module).map_or(&[], |m| m.apart)
 }

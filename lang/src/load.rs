@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, FileId, Sources, codes};
 use crate::ast::{File, ItemKind};
 use crate::declare::units::declare;
 use crate::loader::Loader;
-use crate::names::{Module, Names, module_candidates, used};
+use crate::names::{Module, Names, module_candidates, used as used_in};
 use crate::parallel::STACK;
 use crate::session::{self, Session};
 use crate::{import, library};
@@ -63,13 +63,13 @@ pub fn load(
         modules.push(module);
     }
     session.tidy(&package);
-    let used = used(&modules);
-    for (index, module) in modules.iter_mut().take(library::MODULES.len()).enumerate() {
-        if used[index] && !library::MODULES[index].apart.is_empty() {
-            let (read, found) = session.apart(index, module.file);
-            *module = read;
-            diagnostics.extend(found);
-        }
+    let mut used = used_in(&modules);
+    // One that is read may import others.
+    while let Some(index) = (0..library::MODULES.len()).find(|index| used[*index] && is_unread(*index, &modules)) {
+        let (read, found) = session.apart(index, modules[index].file);
+        modules[index] = read;
+        diagnostics.extend(found);
+        used = used_in(&modules);
     }
     for (module, _) in modules.iter_mut().zip(used).filter(|(module, used)| *used && import::reads(&module.tree)) {
         let (made, found) = session::imported(session, module, loader);
@@ -84,6 +84,11 @@ pub fn load(
         }
     }
     (modules, diagnostics)
+}
+
+/// Whether a module of the library is one that is read only where it is imported, and has not been read yet.
+fn is_unread(index: usize, modules: &[Arc<Module>]) -> bool {
+    !library::MODULES[index].apart.is_empty() && modules[index].tree.items.is_empty()
 }
 
 /// A module with what is wrong with its text.
