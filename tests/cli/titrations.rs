@@ -197,6 +197,20 @@ fn an_electrode_that_no_buffer_has_seen_is_told() {
 }
 
 #[test]
+fn where_there_is_no_end_point_none_is_found() {
+    let weak = fs::read_to_string(root().join("examples/equilibria/weak_acid.mtx")).expect("the example");
+    let expectations = |l: &&str| !l.contains("expect meter.shown");
+    let weak: String = weak.lines().filter(expectations).map(|l| format!("{l}\n")).collect();
+    let dir = folder("no_end_point");
+    for held in ["50 g of water", "50 g of water + 5 mmol of acetate + 5 mmol of Na+"] {
+        write(&dir, "weak.mtx", weak.replace("50 g of water + 1 mmol of acetic_acid", held));
+        let ran = matterixc_in(&dir, &["run", "weak.mtx"]);
+        let said = flat(&format!("{}{}", ran.out, ran.err));
+        assert!(ran.code != 0 && said.contains("no_end_point"), "{held}: {said}");
+    }
+}
+
+#[test]
 fn conductivities_are_those_of_the_tables() {
     let file = root().join("tests/cases/conductivity.mtx");
     let ran = matterixc(&["run", file.to_str().expect("the path is text")]);
