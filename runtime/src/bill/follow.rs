@@ -54,7 +54,7 @@ pub struct Follower<'p> {
     pub(super) asked: Vec<(f64, String)>,
     /// States as they were last shown.
     pub(super) states: Vec<f64>,
-    /// By state, what it was when the run began.
+    /// By state, what it was when the run began, with what happened at that moment: salts have dissolved.
     pub(super) first: Vec<f64>,
     /// By mixture, what equilibria make of it at the end; empty before.
     pub(super) settled: Vec<Settled>,
@@ -64,6 +64,8 @@ pub struct Follower<'p> {
     since: Vec<Option<f64>>,
     /// The latest time heard of, s.
     pub(super) end: f64,
+    /// When the first sample was taken, s.
+    begun: f64,
     /// Whether a sample was taken.
     is_begun: bool,
 }
@@ -88,6 +90,7 @@ impl<'p> Follower<'p> {
             watched: Default::default(),
             since: vec![None; tallies],
             end: 0.0,
+            begun: 0.0,
             is_begun: false,
         }
     }
@@ -111,7 +114,7 @@ impl<'p> Follower<'p> {
         let count = model.states.len();
         self.watched = (Touched::new(count, tallies), Touched::new(count, mixtures));
         self.states = engine.states();
-        self.first = self.states.clone();
+        (self.first, self.begun) = (self.states.clone(), engine.time());
         for (index, tally) in stock.tallies.iter().enumerate() {
             self.tallies[index].0 = engine.eval(tally.value);
             self.counted(index, self.tallies[index].0, engine.time());
@@ -175,6 +178,9 @@ impl Observer for Follower<'_> {
         // Also of one instant: what moves each of two ends may be shown one after the other.
         if !self.watched.1.by(changed).is_empty() {
             self.stream(engine);
+        }
+        if time <= self.begun {
+            self.first = engine.states();
         }
         for &state in changed {
             if let Some(slot) = self.states.get_mut(state as usize) {

@@ -13,8 +13,8 @@ const NOTHING: f64 = 1e-9;
 const MILLI: f64 = 1e3;
 
 impl Follower<'_> {
-    /// Of each vessel and reaction what it made there. A product that was brought in from the start somewhere is left out: what of it a
-    /// reaction made is not known by then.
+    /// Of each vessel and reaction what it made there. A product that was there from the start somewhere is left out, and so is one that a
+    /// reaction takes: what of it a reaction made is not known by then.
     pub(super) fn yields(&self) -> Vec<YieldLine> {
         let mixtures = self.program.model.mixtures.iter().enumerate();
         let reactions = &self.program.inventory.reactions;
@@ -32,7 +32,7 @@ impl Follower<'_> {
         let scarcest = left.as_deref().unwrap_or_default().iter().min_by(|a, b| turns(a).total_cmp(&turns(b)));
         let Some(scarcest) = scarcest else { return Vec::new() };
         let line = |(product, n): &(u32, f64)| {
-            let made = there(*product).filter(|_| !self.is_brought(*product))?;
+            let made = there(*product).filter(|_| !self.is_brought(*product) && !self.is_taken(*product))?;
             let at_most = made + n * turns(&scarcest);
             (made > NOTHING * at_most && at_most > 0.0).then(|| YieldLine {
                 vessel: self.program.scene.get(self.holder(index)).name.clone(),
@@ -52,6 +52,10 @@ impl Follower<'_> {
         let contents = self.program.model.mixtures.iter().flat_map(|m| &m.contents);
         let first = |c: &Content| self.first.get(c.state as usize).copied().unwrap_or(0.0);
         contents.filter(|c| c.species == species).any(|c| first(c) > 0.0)
+    }
+
+    fn is_taken(&self, species: u32) -> bool {
+        self.program.inventory.reactions.iter().any(|r| r.reactants.iter().any(|(s, _)| *s == species))
     }
 
     fn species(&self, index: u32) -> String {
