@@ -58,6 +58,7 @@ mod servers;
 mod sila;
 mod sizes;
 mod slips;
+mod solutions;
 mod spills;
 mod stopped;
 mod strict;

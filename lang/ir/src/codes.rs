@@ -117,10 +117,11 @@ codes! {
     GAS_STAYS "gas-stays" "H3" "a gas leaves that the model keeps dissolved";
     GAS_LEAVES "gas-leaves" "H3" "more of a gas is there than stays dissolved";
     PH_FAR_FROM_25_DEGC "ph-far-from-25-degc" "H3" "the pH of a warm or cold solution is used";
-    HEAT_OF_STRONG_SOLUTION "heat-of-strong-solution" "H3" "the temperature of a concentrated acid or lye is used";
-    VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution is measured out by volume";
+    HEAT_OF_STRONG_SOLUTION "heat-of-strong-solution" "H3" "the temperature of a concentrated solution is used whose heat capacity is unknown";
+    VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution is measured out by volume whose density is unknown";
     HEAT_LEFT_OUT "heat-left-out" "H3" "a temperature is used after a step whose heat the model leaves out";
     HOT_MIXING "hot-mixing" "H3" "a step dissolves, dilutes or neutralises so much that it gets hot";
+    WATER_INTO_ACID "water-into-acid" "H3" "water is poured into a strong acid that gets hot with it";
     WELLS_STAY_COLD "wells-stay-cold" "H3" "a heater warms labware whose wells take no heat in the model";
     NEED_UNMET "need-unmet" "P1" "a step cannot begin because what it needs does not hold";
     VOLUME_OVERFLOW "volume-overflow" "V1" "a vessel gets more than it holds";

@@ -175,8 +175,23 @@ impl<'a> Elaborator<'a> {
                 _ => there.push((*s, *amount)),
             }
         }
-        let volumes = there.into_iter().map(|(s, amount)| Some(amount * self.molar_volume(s, at)?));
-        volumes.sum()
+        let mut amounts: Vec<(SpeciesId, f64)> = Vec::new();
+        for (s, amount) in there {
+            // Said here, and not at the law, where it is missing.
+            self.molar_volume(s, at)?;
+            match amounts.iter_mut().find(|(known, _)| *known == s) {
+                Some((_, sum)) => *sum += amount,
+                None => amounts.push((s, amount)),
+            }
+        }
+        let amounts = amounts.into_iter().map(|(s, amount)| (s, self.graph.number(amount))).collect();
+        self.with_composition(amounts, |lab, id| {
+            let volume = lab.size_in(id, &lab.tables.units.named("Volume"))?;
+            match lab.member_value(id, volume, at) {
+                Value::Num(n) => lab.graph.constant(n.node),
+                _ => None,
+            }
+        })
     }
 
     /// Molar volume, m^3/mol, of a species that is measured out by volume.

@@ -574,24 +574,19 @@ impl<'a> Elaborator<'a> {
         if amount.is_one() {
             return Some((q.node, from, to));
         }
-        for m in self.derived_members(from) {
-            let MemberKind::Value { ty, .. } = &m.member.kind else { continue };
-            let ty = self.resolve_type(ty, m.module);
-            let Type::Quantity { dimension, point: false, .. } = &ty else { continue };
-            if *dimension == amount {
-                let Value::Num(size) = self.member_value(from, m, at) else { return None };
-                let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
-                self.note_place(share, call.span);
-                // A law whose rate follows what is left takes nothing of nothing.
-                let left = |(key, _): &(&crate::eval::lab::ExtensiveKey, &u32)| key.instance == from;
-                let left: BTreeSet<u32> = self.extensive.iter().filter(left).map(|(_, state)| *state).collect();
-                if rate && self.graph.depends(q.node, |op| matches!(op, Op::State(s) if left.contains(s))) {
-                    let zero = self.graph.number(0.0);
-                    let nothing = self.graph.binary(BinaryOp::Le, q.node, zero);
-                    share = self.graph.select(nothing, q.node, share);
-                }
-                return Some((share, from, to));
+        if let Some(m) = self.size_in(from, &amount) {
+            let Value::Num(size) = self.member_value(from, m, at) else { return None };
+            let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
+            self.note_place(share, call.span);
+            // A law whose rate follows what is left takes nothing of nothing.
+            let left = |(key, _): &(&crate::eval::lab::ExtensiveKey, &u32)| key.instance == from;
+            let left: BTreeSet<u32> = self.extensive.iter().filter(left).map(|(_, state)| *state).collect();
+            if rate && self.graph.depends(q.node, |op| matches!(op, Op::State(s) if left.contains(s))) {
+                let zero = self.graph.number(0.0);
+                let nothing = self.graph.binary(BinaryOp::Le, q.node, zero);
+                share = self.graph.select(nothing, q.node, share);
             }
+            return Some((share, from, to));
         }
         let found = self.describe(&q);
         self.report(Diagnostic::error(

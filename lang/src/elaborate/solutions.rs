@@ -12,6 +12,13 @@ use crate::names::DeclId;
 /// Species with mol per kg (kg per kg where counted by mass).
 type Parts = Vec<(SpeciesId, f64)>;
 
+/// How far off the mark, as a share of its volume, making up a recipe goes on, and where it has failed.
+const MADE_UP: f64 = 1e-14;
+const NEARLY_MADE_UP: f64 = 1e-10;
+
+/// Far more steps of a secant than that takes.
+const STEPS: usize = 60;
+
 /// How much of a line's substance a recipe takes.
 #[derive(Clone, Debug)]
 enum Share {
@@ -224,11 +231,11 @@ impl<'a> Elaborator<'a> {
         Some(lines.into_iter().map(portion).collect())
     }
 
-    /// The mass of one cubic metre of a recipe that is made up to the mark, and that of its rest, kg. Volumes add up.
+    /// The mass of one cubic metre of a recipe that is made up to the mark, and that of its rest, kg.
     fn made_up(&mut self, lines: &[Line<'a>], shares: f64) -> Option<(f64, f64)> {
         let species = &self.tables.species;
         let wet = lines.iter().flat_map(|l| &l.of).any(|(s, _)| species.get(*s).is_water);
-        // Masses and volumes that are known, volumes per kg of the whole, volume of a kg of the rest.
+        // Masses and volumes that are known, volumes per kg of the whole, volume of a kg of the rest: each line by itself.
         let (mut mass, mut volume, mut shared, mut rest) = (0.0, 0.0, 0.0, (0.0, Span::default()));
         for line in lines {
             let per_kg = self.volume_with(&line.of, wet, line.field.key.span)?;
@@ -243,9 +250,11 @@ impl<'a> Elaborator<'a> {
             }
         }
         let (per_kg, at) = rest;
-        let whole = (1.0 - volume + per_kg * mass) / (shared + per_kg * (1.0 - shares));
-        let left = whole * (1.0 - shares) - mass;
-        if whole > 0.0 && left > 0.0 {
+        let rise = shared + per_kg * (1.0 - shares);
+        let whole = (1.0 - volume + per_kg * mass) / rise;
+        let left_of = |whole: f64| whole * (1.0 - shares) - mass;
+        let filled = self.filled_up(lines, wet, mass, shares, (whole, rise)).map(|whole| (whole, left_of(whole)));
+        if let Some((whole, left)) = filled.filter(|(whole, left)| *whole > 0.0 && *left > 0.0) {
             return Some((whole, left));
         }
         let litres = matterix_ir::quantity::show_number((1e4 * (volume + shared * whole.max(0.0))).round() / 1e4);
@@ -253,6 +262,45 @@ impl<'a> Elaborator<'a> {
         let d = Diagnostic::error(codes::INVALID_RECIPE, at, headline, "this recipe");
         self.report(d.help(format!("of each litre of solution they take up {litres} L; take less of them")));
         None
+    }
+
+    /// The mass, kg, with which lines make one cubic metre together, from that which they would have if their volumes added up, and how
+    /// their volume then rises with it: by a secant. None where no mass does.
+    fn filled_up(
+        &mut self,
+        lines: &[Line<'a>],
+        wet: bool,
+        mass: f64,
+        shares: f64,
+        (whole, rise): (f64, f64),
+    ) -> Option<f64> {
+        let at = lines.first()?.field.key.span;
+        let excess = |lab: &mut Self, whole: f64| {
+            let of = |line: &Line<'a>| {
+                let kg = match line.share {
+                    Share::PerVolume(v) => v,
+                    Share::Fraction(v) => v * whole,
+                    Share::Rest => whole * (1.0 - shares) - mass,
+                    Share::Amounts(_) => 0.0,
+                };
+                line.of.iter().map(|(s, n)| (*s, n * kg)).collect::<Parts>()
+            };
+            Some(lab.volume_with(&lines.iter().flat_map(of).collect::<Parts>(), wet, at)? - 1.0)
+        };
+        let (mut whole, mut rise) = (whole, rise);
+        let mut over = excess(self, whole)?;
+        for _ in 0..STEPS {
+            let next = whole - over / rise;
+            if over.abs() <= MADE_UP || next == whole {
+                break;
+            }
+            let over_next = excess(self, next)?;
+            if over_next != over {
+                rise = (over_next - over) / (next - whole);
+            }
+            (whole, over) = (next, over_next);
+        }
+        (over.abs() <= NEARLY_MADE_UP).then_some(whole)
     }
 
     /// kg of what is given as amounts.

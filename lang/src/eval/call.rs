@@ -166,7 +166,8 @@ impl<'a> Elaborator<'a> {
     /// What a call is remembered by: a function of instances, species, reactions and lists of them always gives the same node, and so
     /// does one of numbers that the run does not change.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
-        if self.rate_prefix.is_some() {
+        // A mixture that stands nowhere is gone after it was asked, and another one takes its number.
+        if self.rate_prefix.is_some() || self.instances.last().is_some_and(|i| i.composition.is_some()) {
             return None;
         }
         let mut known = Vec::with_capacity(values.len() + 2);

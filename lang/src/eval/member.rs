@@ -763,6 +763,11 @@ impl<'a> Elaborator<'a> {
         let Some((ty, m)) = self.extensive_type(id, member) else { return Value::Error };
         let Type::Quantity { dimension, .. } = &ty else { return Value::Error };
         let dimension = dimension.clone();
+        if let Some(of) = &self.instances[id.0 as usize].composition {
+            let given = of.iter().find(|(there, _)| *there == s).map(|(_, node)| *node);
+            let node = given.unwrap_or_else(|| self.graph.number(0.0));
+            return self.num(node, dimension);
+        }
         let index = self.instances[id.0 as usize].amounts.get(member).and_then(|of| of.get(&s)).copied();
         let node = match index {
             Some(i) if self.mode().at_start => self.states[i as usize].initial,

@@ -10,13 +10,14 @@ use matterix_ir::{NodeId, Span};
 use rustc_hash::FxHashMap;
 
 use super::grids::Grid;
-use super::{Elaborator, MemberKey};
+use super::{Elaborator, MemberKey, Mode};
 use crate::ast::{AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, MemberKind, Role};
 use crate::declare::SpeciesId;
 use crate::declare::Type;
 use crate::declare::tables::{Kind, MemberRef, Tables, member_name};
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
+use crate::units::Dimension;
 
 /// A field given for an instance: where its names are looked up, and whether it stands in the lab.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +70,8 @@ pub struct Instance<'a> {
     pub amounts: BTreeMap<String, BTreeMap<SpeciesId, u32>>,
     /// What it holds at the start: mol (or kg where counted by mass).
     pub contents: Vec<(SpeciesId, NodeId)>,
+    /// The amounts it stands for, where it is no thing of the lab but what a recipe makes.
+    pub composition: Option<Vec<(SpeciesId, NodeId)>>,
     /// What its contents are called as a reagent.
     pub origin: Option<String>,
     /// What stands after `at` behind what it holds, with the module of the text.
@@ -291,6 +294,21 @@ impl<'a> Elaborator<'a> {
         id
     }
 
+    /// Asks something of a mixture of given amounts that stands nowhere in the lab; none where the lab knows no mixtures.
+    pub fn with_composition<R>(
+        &mut self,
+        amounts: Vec<(SpeciesId, NodeId)>,
+        ask: impl FnOnce(&mut Self, InstanceId) -> Option<R>,
+    ) -> Option<R> {
+        let kind = self.tables.kinds.values().find(|k| k.matter.is_some()).map(|k| k.id)?;
+        let id = InstanceId(self.instances.len() as u32);
+        let composition = Some(amounts);
+        self.instances.push(Instance { kinds: vec![kind], composition, ..Instance::default() });
+        let answer = self.in_mode(Mode::START, |lab| ask(lab, id));
+        self.instances.truncate(id.0 as usize);
+        answer
+    }
+
     /// The top-level instance with this name.
     pub fn find_instance(&self, name: &str) -> Option<InstanceId> {
         self.top_level.get(name).copied()
@@ -389,6 +407,14 @@ impl<'a> Elaborator<'a> {
     pub fn derived_members(&self, id: InstanceId) -> Vec<MemberRef<'a>> {
         let derived = |m: &MemberRef<'a>| matches!(&m.member.kind, MemberKind::Value { role: Role::Derived, .. });
         self.all_members(id).iter().copied().filter(derived).collect()
+    }
+
+    /// The member by which a mixture is measured out in a dimension: its mass, its volume.
+    pub fn size_in(&mut self, id: InstanceId, wanted: &Dimension) -> Option<MemberRef<'a>> {
+        self.derived_members(id).into_iter().find(|m| {
+            let MemberKind::Value { ty, .. } = &m.member.kind else { return false };
+            matches!(self.resolve_type(ty, m.module), Type::Quantity { dimension, point: false, .. } if dimension == *wanted)
+        })
     }
 
     /// The type of an extensive quantity.

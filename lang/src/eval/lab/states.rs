@@ -346,6 +346,9 @@ impl<'a> Elaborator<'a> {
 
     /// The species that can get into a mixture.
     pub fn mixture_species(&self, id: InstanceId) -> Vec<SpeciesId> {
+        if let Some(of) = &self.instances[id.0 as usize].composition {
+            return of.iter().map(|(s, _)| *s).collect();
+        }
         if self.prototype {
             return self.tables.species.iter().take(1).map(|s| s.0).collect();
         }

@@ -1,0 +1,292 @@
+//! Volumes, heat capacities and heats of solutions against tables of what is measured, and what must hold of any mixture.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use crate::harness::{Ended, folder, matterixc, write};
+
+/// Mass fraction of a solute in water with g/mL and J/(g*K) at 25 degC: the equations of Laliberte, J. Chem. Eng. Data 54 (2009) 1725;
+/// H2SO4 of 98 %, ethanol and methanol Perry's Chemical Engineers' Handbook, and so the heat capacities of HCl and HNO3 (20 degC). 0 where
+/// none is compared.
+const MEASURED: [(&str, f64, f64, f64); 40] = [
+    ("NaOH", 10.0, 1.1071, 3.79),
+    ("NaOH", 30.0, 1.3242, 3.54),
+    ("NaOH", 50.0, 1.5163, 3.26),
+    ("H2SO4", 10.0, 1.065, 3.86),
+    ("H2SO4", 50.0, 1.3925, 2.52),
+    ("H2SO4", 78.0, 1.7013, 1.87),
+    ("H2SO4", 98.0, 1.831, 0.0),
+    ("HCl", 10.0, 1.0457, 0.0),
+    ("HCl", 20.0, 1.0953, 0.0),
+    ("HCl", 37.0, 1.1806, 2.45),
+    ("NaCl", 5.0, 1.0324, 3.94),
+    ("NaCl", 15.0, 1.1067, 3.56),
+    ("NaCl", 25.0, 1.1856, 3.29),
+    ("KOH", 20.0, 1.1851, 3.27),
+    ("KOH", 45.0, 1.451, 2.63),
+    ("HNO3", 30.0, 1.1767, 3.05),
+    ("HNO3", 68.0, 1.3956, 2.59),
+    ("KCl", 10.0, 1.0616, 3.67),
+    ("KCl", 24.0, 1.1598, 3.08),
+    ("CaCl2", 20.0, 1.1758, 3.14),
+    ("CaCl2", 40.0, 1.3898, 2.54),
+    ("NH4Cl", 10.0, 1.0263, 3.74),
+    ("NH4Cl", 25.0, 1.0688, 0.0),
+    ("Na2CO3", 10.0, 1.1017, 3.79),
+    ("Na2CO3", 20.0, 1.2135, 3.60),
+    ("NH3", 10.0, 0.9571, 4.08),
+    ("NH3", 28.0, 0.8934, 4.18),
+    ("H3PO4", 30.0, 1.1796, 3.26),
+    ("H3PO4", 85.0, 1.6849, 1.84),
+    ("acetic_acid", 30.0, 1.034, 0.0),
+    ("acetic_acid", 70.0, 1.0647, 0.0),
+    ("KNO3", 20.0, 1.1302, 3.44),
+    ("EtOH", 10.0, 0.98043, 0.0),
+    ("EtOH", 30.0, 0.95067, 0.0),
+    ("EtOH", 50.0, 0.90985, 0.0),
+    ("EtOH", 70.0, 0.8634, 0.0),
+    ("EtOH", 90.0, 0.81362, 0.0),
+    ("MeOH", 40.0, 0.93161, 0.0),
+    ("MeOH", 80.0, 0.8432, 0.0),
+    ("HCl", 5.0, 1.0212, 0.0),
+];
+
+/// How far off density and heat capacity may be, as shares; the density of ethanol.
+const DENSITY: f64 = 0.01;
+const CAPACITY: f64 = 0.04;
+const ETHANOL: f64 = 0.005;
+
+/// Salts that the library lacks and the tables have.
+const MORE: &str = "species CaCl2 { formula: \"CaCl2\", density: 2.15 g/mL, heat_capacity: 72.9 J/(mol*K), dissolves: Ca2+ + 2 Cl-, heat_of_solution: -81.3 kJ/mol }
+species NH4NO3 { formula: \"NH4NO3\", density: 1.72 g/mL, heat_capacity: 139.3 J/(mol*K), dissolves: NH4+ + NO3-, heat_of_solution: 25.7 kJ/mol }
+";
+
+/// Weighing and drawing without a device.
+const BY_HAND: &str = "extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 ms
+    effect move(m, from: source, to: target)
+extern skill draw(v: Volume) from(source: Vessel) into(target: Vessel)
+    takes 1 ms
+    effect move(v, from: source, to: target)
+";
+
+fn run(name: &str, text: &str) -> Ended {
+    let dir = folder(name);
+    write(&dir, "lab.mtx", text);
+    matterixc(&["run", dir.join("lab.mtx").to_str().expect("the path is text"), "--format", "json"])
+}
+
+/// The value that each expectation measured, in the order of the text.
+fn measured(ran: &Ended) -> Vec<f64> {
+    let report: Value = serde_json::from_str(&ran.out).unwrap_or_else(|e| panic!("{e}: {}{}", ran.out, ran.err));
+    let all = report["expectations"].as_array().expect("expectations");
+    all.iter().map(|e| e["measured"][0]["value"].as_f64().expect("a value")).collect()
+}
+
+#[test]
+fn stocks_have_the_density_and_heat_capacity_that_are_measured() {
+    let (mut vessels, mut looks) = (String::new(), String::new());
+    for (i, (what, percent, ..)) in MEASURED.iter().enumerate() {
+        let _ = writeln!(
+            vessels,
+            "    c{i} = Beaker250mL at ({i}, 0, 0) m holding {percent} g of {what} + {} g of water",
+            100.0 - percent
+        );
+        let _ = writeln!(looks, "    expect c{i}.contents.volume > 0 mL\n    expect c{i}.contents.capacity > 0 J/K");
+    }
+    let text = format!(
+        "mtx 1\nuse std::glassware::Beaker250mL\n{MORE}lab bench {{\n    ambient: 25 degC\n{vessels}}}\nworkflow look in bench {{\n    wait 1 s\n{looks}}}\n"
+    );
+    let found = measured(&run("measured_solutions", &text));
+    for ((what, percent, density, capacity), of) in MEASURED.iter().zip(found.chunks(2)) {
+        let [volume, heat] = of else { panic!("two of each") };
+        let off = 100.0 / (volume * density) - 1.0;
+        let bar = if *what == "EtOH" { ETHANOL } else { DENSITY };
+        assert!(off.abs() <= bar, "{what} of {percent} %: density off by {off:.4}");
+        let off = heat / 100.0 / capacity - 1.0;
+        assert!(*capacity == 0.0 || off.abs() <= CAPACITY, "{what} of {percent} %: heat capacity off by {off:.4}");
+    }
+}
+
+/// A lab with these vessels, and a workflow.
+fn lab(head: &str, vessels: &[String], steps: &str) -> String {
+    let vessels = vessels.iter().enumerate().fold(String::new(), |mut all, (i, vessel)| {
+        let _ = writeln!(all, "    c{i} = Beaker1000mL at ({i}, 0, 0) m holding {vessel}");
+        all
+    });
+    format!(
+        "mtx 1\n{head}use std::glassware::Beaker1000mL\n{MORE}{BY_HAND}lab bench {{\n    ambient: 25 degC\n{vessels}}}\nworkflow look in bench {{\n{steps}}}\n"
+    )
+}
+
+/// Numbers that look random, from 0 to 1, always the same.
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn of<'a>(&mut self, all: &[&'a str]) -> &'a str {
+        all[(self.next() * all.len() as f64) as usize]
+    }
+}
+
+const SOLUTES: [&str; 12] =
+    ["NaOH", "HCl", "H2SO4", "HNO3", "NaCl", "KCl", "CaCl2", "NH4NO3", "KOH", "Na2CO3", "NH4Cl", "H3PO4"];
+
+#[test]
+fn half_of_a_solution_has_half_of_all_and_a_transfer_by_volume_moves_its_share() {
+    let mut draw = Draw(24);
+    let (mut vessels, mut steps) = (Vec::new(), String::new());
+    for what in SOLUTES {
+        let mass = 5.0 + 40.0 * draw.next();
+        vessels.push(format!("{mass} g of {what} + 100 g of water at 60 degC"));
+        vessels.push(format!("{} g of {what} + 50 g of water at 60 degC", mass / 2.0));
+        vessels.push("0 g of water".to_owned());
+    }
+    let at = |case: usize, which: usize| format!("c{}.contents", 3 * case + which);
+    for case in 0..12 {
+        for member in ["volume", "capacity", "mass"] {
+            let _ = writeln!(
+                steps,
+                "    expect {0}.{member} / {1}.{member} in 1.999999 .. 2.000001",
+                at(case, 0),
+                at(case, 1)
+            );
+        }
+    }
+    for case in 0..12 {
+        let _ = writeln!(steps, "    draw 20 mL from c{} into c{}", 3 * case, 3 * case + 2);
+        let _ = writeln!(steps, "    expect {}.volume in 19.9999999 mL .. 20.0000001 mL", at(case, 2));
+        let (drawn, whole) = (at(case, 2), at(case, 1));
+        let _ = writeln!(
+            steps,
+            "    expect {drawn}.mass / {drawn}.volume / ({whole}.mass / {whole}.volume) in 0.999999999 .. 1.000000001"
+        );
+    }
+    let ran = run("halves", &lab("", &vessels, &steps));
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    assert_eq!(measured(&ran).len(), 60);
+}
+
+#[test]
+fn heat_does_not_depend_on_the_order_in_which_solutions_come_together() {
+    let mut draw = Draw(7);
+    for head in ["", "use std::equilibria\n"] {
+        let (mut vessels, mut steps, mut looks) = (Vec::new(), String::new(), String::new());
+        for case in 0..8 {
+            let (a, b) = (draw.of(&SOLUTES), draw.of(&SOLUTES));
+            let (m, n, warm) = (1.0 + 20.0 * draw.next(), 1.0 + 20.0 * draw.next(), 25.0 + 30.0 * draw.next());
+            for _ in 0..2 {
+                vessels.push(format!("{m} g of {a} + 30 g of water at {warm} degC"));
+                vessels.push(format!("{n} g of {b}"));
+                vessels.push("80 g of water".to_owned());
+            }
+            let i = 6 * case;
+            // The solid into the water, and the first solution to both; or the solution diluted, and then the solid.
+            let _ = writeln!(steps, "    weigh_out {n} g from c{} into c{}", i + 1, i + 2);
+            let _ = writeln!(steps, "    weigh_out c{}.contents.mass from c{} into c{}", i, i, i + 2);
+            let _ = writeln!(steps, "    weigh_out 80 g from c{} into c{}", i + 5, i + 3);
+            let _ = writeln!(steps, "    weigh_out {n} g from c{} into c{}", i + 4, i + 3);
+            let _ = writeln!(
+                looks,
+                "    expect abs(c{}.contents.temperature - c{}.contents.temperature) < 20 mK",
+                i + 2,
+                i + 3
+            );
+        }
+        let ran = run("hess", &lab(head, &vessels, &format!("{steps}{looks}")));
+        assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    }
+}
+
+/// Stocks of the laboratory.
+const STOCKS: &str = "solution oil_of_vitriol { H2SO4: 98 %w/w, water: rest }
+solution conc_hcl { HCl: 37 %w/w, water: rest }
+solution conc_hno3 { HNO3: 68 %w/w, water: rest }
+";
+
+/// Grams of what come into so many grams of water at 25 degC, with the temperature, degC, that follows from published integral heats of
+/// solution and measured heat capacities: 25 + heat / (mass * heat capacity).
+///
+/// - NaOH: -44.5 kJ/mol (CRC Handbook) with the course of Felder and Rousseau, Elementary Principles of Chemical Processes, table B.11, 0.4 and
+///   4.3 kJ/mol less; 3.82 and 3.53 J/(g*K).
+/// - H2SO4 of 98 %: the same table, from -3.9 kJ/mol to -71.5, -66.7 and -59.4 kJ/mol; 3.87, 3.46 and 2.54 J/(g*K).
+/// - HCl of 37 %: the same table, from -59.1 to -68.6 kJ/mol; 2.95 J/(g*K).
+/// - HNO3 of 68 %: Thomsen, from -18.0 to -29.2 kJ/mol; 3.02 J/(g*K).
+/// - NH4Cl, KNO3: 14.8 and 33 kJ/mol (CRC Handbook; KNO3 less its heat of dilution); 3.77 and 3.56 J/(g*K).
+const PEAKS: [(f64, &str, f64, f64); 8] = [
+    (10.0, "NaOH", 100.0, 51.2),
+    (40.0, "NaOH", 100.0, 106.4),
+    (10.0, "oil_of_vitriol", 100.0, 40.9),
+    (50.0, "oil_of_vitriol", 50.0, 134.2),
+    (100.0, "conc_hcl", 100.0, 41.3),
+    (100.0, "conc_hno3", 100.0, 45.0),
+    (10.0, "NH4Cl", 100.0, 18.3),
+    (20.0, "KNO3", 100.0, 9.7),
+];
+
+/// How far off a peak may be, K.
+const PEAK: f64 = 3.0;
+
+#[test]
+fn dissolving_and_diluting_warm_as_the_literature_says() {
+    let (mut vessels, mut steps) = (Vec::new(), String::new());
+    for (i, (mass, what, water, _)) in PEAKS.iter().enumerate() {
+        vessels.push(format!("{mass} g of {what}"));
+        vessels.push(format!("{water} g of water"));
+        let (from, to) = (2 * i, 2 * i + 1);
+        let _ = writeln!(
+            steps,
+            "    weigh_out {mass} g from c{from} into c{to}\n    wait 1 ms\n    expect c{to}.contents.temperature > 0 degC"
+        );
+    }
+    for head in ["", "use std::equilibria\n"] {
+        let ran = run("peaks", &lab(&format!("{head}{STOCKS}"), &vessels, &steps));
+        assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+        for ((mass, what, water, wanted), found) in PEAKS.iter().zip(measured(&ran)) {
+            assert!(
+                (found - wanted).abs() <= PEAK,
+                "{head}{mass} g of {what} in {water} g of water: {found:.1} degC, not {wanted}"
+            );
+        }
+    }
+}
+
+#[test]
+fn neutralisation_gives_off_its_heat_once() {
+    let acid = "solution acid { HCl: 0.1 mol/kg, water: rest }\nsolution base { NaOH: 0.1 mol/kg, water: rest }\n";
+    let own = "reaction neutralisation: H+ + OH- -> H2O {
+    rate: 1e8 L/(mol*s)
+    order: { H+: 1, OH-: 1 }
+    enthalpy: -55.8 kJ/mol
+}
+";
+    let vessels = ["100 g of acid", "100 g of base"].map(str::to_owned);
+    let steps = "    weigh_out 100 g from c0 into c1
+    wait 100 ms
+    expect (c1.contents.temperature - 25 degC) * c1.contents.capacity / 10 mmol in 55 kJ/mol .. 57 kJ/mol
+";
+    for (uses, reaction) in [("", own), ("use std::equilibria\n", "")] {
+        let ran = run("neutralised", &lab(&format!("{uses}{acid}{reaction}"), &vessels, steps));
+        assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    }
+}
+
+#[test]
+fn pouring_water_into_strong_acid_is_told_from_pouring_acid_into_water() {
+    let vessels = ["50 g of oil_of_vitriol", "100 g of water"].map(str::to_owned);
+    let told = |from: &str, into: &str| {
+        let dir = folder("acid_and_water");
+        write(&dir, "lab.mtx", lab(STOCKS, &vessels, &format!("    weigh_out 4 g from {from} into {into}\n")));
+        let ended = matterixc(&["check", dir.join("lab.mtx").to_str().expect("the path is text")]);
+        format!("{}{}", ended.out, ended.err)
+    };
+    let found = told("c1", "c0");
+    assert!(found.contains("water-into-acid"), "{found}");
+    let found = told("c0", "c1");
+    assert!(!found.contains("water-into-acid") && !found.contains("hot-mixing"), "{found}");
+}
