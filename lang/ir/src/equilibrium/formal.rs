@@ -13,7 +13,7 @@ use super::{Layout, Phase, System, Written};
 /// Between which logarithms of an activity a solution is sought, and how often that is halved: then Newton's method goes on. Electrons
 /// with these activities have potentials of 3.9 V, beyond those of all half-cells in water.
 const ACTIVITIES: (f64, f64) = (-150.0, 150.0);
-const HALVINGS: usize = 13;
+const HALVINGS: usize = 10;
 
 /// A share of what is bound that is rounding.
 const ROUNDED: f64 = 1e-13;
@@ -96,7 +96,20 @@ pub(super) fn bracketed(free: &Problem<'_>) -> Option<Begin> {
         let all: f64 = (0..basis.of.len()).map(|i| (basis.of[i][c] * at(i)).abs()).sum();
         (bound(&at) - wanted, ROUNDED * all)
     };
-    for (limit, sign) in [(ACTIVITIES.0, 1.0), (ACTIVITIES.1, -1.0)] {
+    let (mut low, mut high) = ACTIVITIES;
+    let mut is_flat = false;
+    let mut last: Option<(f64, Solution)> = None;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        let solution = solve(&rest.system, &rest.args(free, middle))?;
+        let (excess, rounded) = excess(&solution);
+        is_flat |= excess.abs() <= rounded;
+        *(if excess < 0.0 { &mut low } else { &mut high }) = middle;
+        last = Some((middle, solution));
+    }
+    // Where rounding hides what the activity changes, or the bracket ends where it began, nothing may be left that binds more, or gives any.
+    let is_at_end = is_flat || low == ACTIVITIES.0 || high == ACTIVITIES.1;
+    for (limit, sign) in [(ACTIVITIES.0, 1.0), (ACTIVITIES.1, -1.0)].into_iter().filter(|_| is_at_end) {
         let solution = solve(&rest.system, &rest.args(free, limit))?;
         let (excess, rounded) = excess(&solution);
         if sign * excess >= -rounded {
@@ -104,14 +117,6 @@ pub(super) fn bracketed(free: &Problem<'_>) -> Option<Begin> {
             held.push(rest.member);
             return Some(Begin::AtLimit(start, held, limit));
         }
-    }
-    let (mut low, mut high) = ACTIVITIES;
-    let mut last: Option<(f64, Solution)> = None;
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        let solution = solve(&rest.system, &rest.args(free, middle))?;
-        *(if excess(&solution).0 < 0.0 { &mut low } else { &mut high }) = middle;
-        last = Some((middle, solution));
     }
     let (activity, solution) = last?;
     let (start, held) = rest.begin(free, &solution, activity)?;
