@@ -188,12 +188,10 @@ def equilibrium(row):
     elif row["kind"] == "solubility":
         numbers, worst = crystallising(row)
         constant = "analytic: [" + ", ".join(number(x) for x in numbers) + "]"
-        said = [f"    // {sources.replace('  // ', '')}, met within {max(worst, 0.1):.1f} %"]
-        sources = ""
+        said = [f"    // met within {max(worst, 0.1):.1f} %"]
     elif row["capacity"] and row["kind"] == "pka":
         constant = "analytic: [" + ", ".join(number(x) for x in analytic(row)) + "]"
-        said = [f"    // pK {number(row['value'])}, {number(row['enthalpy'])} kJ/mol, {number(row['capacity'])} J/(mol*K){sources.replace('  //', '')}"]
-        sources = ""
+        said = [f"    // pK {number(row['value'])}, {number(row['enthalpy'])} kJ/mol, {number(row['capacity'])} J/(mol*K)"]
     else:
         constant = f"{row['kind']}: {number(row['value'])}"
         if row["enthalpy"]:

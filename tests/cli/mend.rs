@@ -189,8 +189,8 @@ fn a_label_that_its_recipe_misses_is_left_to_a_person() {
         offered,
         [
             both("0.003973 mol/kg", "KI", "0.6684 g"),
-            both("95.91 g/L", "NaCl", "0.8969 %w/w"),
-            both("0.1545 mol/L", "brine", "42.15 g"),
+            both("95.52 g/L", "NaCl", "0.8969 %w/w"),
+            both("0.1545 mol/L", "brine", "42.18 g"),
         ]
     );
     assert!(lines.iter().flat_map(|line| line["fixes"].as_array()).flatten().all(|fix| fix["asks"] == true));

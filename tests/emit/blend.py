@@ -13,7 +13,7 @@ def run(protocol):
     plate = shaker.load_labware("corning_96_wellplate_360ul_flat", label="plate", namespace="opentrons", version=2)
     stock = protocol.load_labware("nest_12_reservoir_15ml", "5", label="stock", namespace="opentrons", version=1)
     stock["A1"].load_liquid(liquid_1, 10000)
-    stock["A2"].load_liquid(liquid_2, 5000)
+    stock["A2"].load_liquid(liquid_2, 4999.913409132)
     # blend.mtx:19: close latch shaker
     shaker.close_labware_latch()
     # blend.mtx:20: note "with care"

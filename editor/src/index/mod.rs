@@ -13,7 +13,7 @@ mod views;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, LazyLock, OnceLock, RwLock};
+use std::sync::{Arc, LazyLock, RwLock};
 
 use matterix_ir::{FileId, Sources, Span};
 use matterix_lang::ast::{Item, ItemKind};
@@ -72,16 +72,19 @@ pub struct Index {
     described: RwLock<HashMap<(Dimension, bool), String>>,
 }
 
-/// The part of the library, which is the same for everyone.
-static LIBRARY: OnceLock<Arc<Part>> = OnceLock::new();
+/// So many parts of the library are kept.
+const MOST: usize = 8;
+
+/// The part of the library, which is the same for all that read the same modules of it, by which these are.
+static LIBRARY: RwLock<Vec<(Vec<bool>, Arc<Part>)>> = RwLock::new(Vec::new());
 
 impl Index {
     /// The index of an analysis.
     pub fn of(analysis: &Analysis) -> Index {
-        let library = LIBRARY.get_or_init(|| Arc::new(Self::library(analysis)));
+        let library = Self::library_of(analysis);
         let mut index = Index {
-            library: library.clone(),
             own: Part { first: library.defs.len() as u32, ..Part::default() },
+            library,
             modules: analysis.modules.clone(),
             sources: Arc::new(analysis.sources.clone()),
             meanings: analysis.meanings.joined(),
@@ -97,6 +100,26 @@ impl Index {
         let around = analysis.meanings.around.clone();
         let meanings = Arc::new(SemanticIndex { around, ..SemanticIndex::default() });
         Index::of(&Analysis { meanings, ..analysis.clone() })
+    }
+
+    /// The part of the library; made once for all that read the same modules.
+    fn library_of(analysis: &Analysis) -> Arc<Part> {
+        let read = |module: &Arc<Module>| module.is_library() && !module.tree.items.is_empty();
+        let key: Vec<bool> = analysis.modules.iter().map(read).collect();
+        let find = |all: &[(Vec<bool>, Arc<Part>)]| all.iter().find(|(k, _)| *k == key).map(|(_, part)| part.clone());
+        if let Some(known) = LIBRARY.read().ok().and_then(|all| find(&all)) {
+            return known;
+        }
+        let made = Arc::new(Self::library(analysis));
+        let Ok(mut all) = LIBRARY.write() else { return made };
+        if let Some(known) = find(&all) {
+            return known;
+        }
+        if all.len() == MOST {
+            all.remove(0);
+        }
+        all.push((key, made.clone()));
+        made
     }
 
     fn library(analysis: &Analysis) -> Part {

@@ -10,10 +10,11 @@ use super::problem::Problem;
 use super::solve::{Solution, solve};
 use super::{Layout, Phase, System, Written};
 
-/// Between which logarithms of an activity a solution is sought, and how often that is halved: then Newton's method goes on. Electrons
+/// Between which logarithms of an activity a solution is sought, and how often that is halved before Newton's method goes on,
+/// first and where it finds nothing. Electrons
 /// with these activities have potentials of 3.9 V, beyond those of all half-cells in water.
 const ACTIVITIES: (f64, f64) = (-150.0, 150.0);
-const HALVINGS: usize = 10;
+pub(super) const HALVINGS: [usize; 2] = [10, 18];
 
 /// A share of what is bound that is rounding.
 const ROUNDED: f64 = 1e-13;
@@ -84,7 +85,7 @@ impl Rest {
 }
 
 /// Where to begin; none where there is no formal member.
-pub(super) fn bracketed(free: &Problem<'_>) -> Option<Begin> {
+pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
     let rest = free.system.rest.as_ref()?;
     let basis = &free.basis;
     let c = basis.masters.iter().position(|i| *i == rest.member)?;
@@ -99,7 +100,7 @@ pub(super) fn bracketed(free: &Problem<'_>) -> Option<Begin> {
     let (mut low, mut high) = ACTIVITIES;
     let mut is_flat = false;
     let mut last: Option<(f64, Solution)> = None;
-    for _ in 0..HALVINGS {
+    for _ in 0..halvings {
         let middle = 0.5 * (low + high);
         let solution = solve(&rest.system, &rest.args(free, middle))?;
         let (excess, rounded) = excess(&solution);

@@ -92,13 +92,12 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
         }
     }
     let start = free.start(&totals);
-    let found = match formal::bracketed(&free) {
-        Some(Begin::Near(start, held)) => follow(&free, &start, &lacking, held),
-        Some(Begin::AtLimit(start, held, limit)) => follow(&Problem { limit, ..free.clone() }, &start, &lacking, held),
-        None => None,
+    let bracketed = |halvings| match formal::bracketed(&free, halvings)? {
+        Begin::Near(start, held) => follow(&free, &start, &lacking, held),
+        Begin::AtLimit(start, held, limit) => follow(&Problem { limit, ..free.clone() }, &start, &lacking, held),
     };
-    if found.is_some() {
-        return found;
+    if let Some(found) = formal::HALVINGS.into_iter().find_map(bracketed) {
+        return Some(found);
     }
     let found = follow(&free, &start, &lacking, given);
     let found = found.or_else(|| follow(&free, &start, &lacking, Vec::new()));
