@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::equilibrium::{Layout, Part, Phase, System};
 
-const LN_10: f64 = std::f64::consts::LN_10;
+use super::sketch::LN_10;
 
 /// By how much a solution is off.
 #[derive(Clone, Copy, Default)]

@@ -8,11 +8,14 @@
 
 mod chemistry;
 mod judge;
+#[path = "../../lang/ir/src/equilibrium/sketch.rs"]
+mod sketch;
 
 use std::time::Instant;
 
-use chemistry::{Chemistry, Draw};
-use matterix_ir::equilibrium::{Part, Phase, System};
+use chemistry::{Draw, ready};
+use matterix_ir::equilibrium::{Equation, Member, Part, Phase, System, Unsettled, Written};
+use sketch::Sketch;
 
 /// How many of a hundred may have no solution, and bounds of what is off: of equations, and of atoms and charge.
 struct Bounds {
@@ -33,8 +36,8 @@ fn main() -> Result<(), String> {
     let given = args.iter().position(|a| a == "--mixtures").and_then(|i| args.get(i + 1));
     let count = given.map_or(Ok(100_000), |n| n.parse::<u64>().map_err(|e| format!("--mixtures {n}: {e}")))?;
     let fine = [
-        random("acids, ammonia, silver and lime", count, Chemistry::bench(), &ACIDS)?,
-        random("half-cells", count / 10, Chemistry::half_cells(), &HALF_CELLS)?,
+        random("acids, ammonia, silver and lime", count, chemistry::bench(), &ACIDS)?,
+        random("half-cells", count / 10, Sketch::half_cells(), &HALF_CELLS)?,
     ];
     sizes()?;
     titration()?;
@@ -60,14 +63,14 @@ fn mixture(seed: u64, (system, blank): &(System, Vec<f64>)) -> Vec<f64> {
 }
 
 /// Solves random mixtures; whether all are met.
-fn random(of: &str, count: u64, chemistry: Chemistry, bounds: &Bounds) -> Result<bool, String> {
-    let ready = chemistry.ready()?;
-    let elements = judge::elements(&ready.0);
+fn random(of: &str, count: u64, sketch: Sketch, bounds: &Bounds) -> Result<bool, String> {
+    let made = ready(sketch)?;
+    let elements = judge::elements(&made.0);
     let mut worst = [(0.0, 0); 3];
     let mut failed = Vec::new();
     for seed in 0..count {
-        let args = mixture(seed, &ready);
-        let Some(found) = judge::gaps(&ready.0, &args, &elements, bounds.trace) else {
+        let args = mixture(seed, &made);
+        let Some(found) = judge::gaps(&made.0, &args, &elements, bounds.trace) else {
             failed.push(seed);
             continue;
         };
@@ -77,7 +80,7 @@ fn random(of: &str, count: u64, chemistry: Chemistry, bounds: &Bounds) -> Result
             }
         }
     }
-    println!("{count} random mixtures of {} species, 1e-9 to 1e3 mol: {of}", ready.0.members().len());
+    println!("{count} random mixtures of {} species, 1e-9 to 1e3 mol: {of}", made.0.members().len());
     println!("  without a solution        {}", failed.len());
     if let Some(first) = failed.first() {
         println!("  the first of them         {first}");
@@ -104,7 +107,7 @@ fn sizes() -> Result<(), String> {
     println!("\nsolution by number of species, each mixture new");
     let mut points = Vec::new();
     for size in [12, 25, 50, 100, 200] {
-        let (system, blank) = Chemistry::of_size(size).ready()?;
+        let (system, blank) = ready(chemistry::of_size(size))?;
         let layout = system.layout();
         let count = 400;
         let mixtures: Vec<Vec<f64>> = (0..5 * count)
@@ -130,7 +133,7 @@ fn sizes() -> Result<(), String> {
 
 /// Sodium carbonate with acid in 100 steps.
 fn titration() -> Result<(), String> {
-    let (system, blank) = Chemistry::carbonate().ready()?;
+    let (system, blank) = ready(chemistry::carbonate())?;
     let find = |name: &str| system.members().iter().position(|m| m.name == name).ok_or(format!("no {name}"));
     let (soda, acid) = (system.layout().amount(find("CO3--")?), system.layout().amount(find("H+")?));
     let mut round = 0;

@@ -189,14 +189,8 @@ fn plain(name: &str) -> String {
 
 /// The modules that every file sees.
 fn prelude(texts: &[Text]) -> Vec<String> {
-    let items = texts.iter().filter(|text| text.module == "std::prelude").flat_map(|text| &text.tree.items);
-    let paths = items.filter_map(|item| match &item.kind {
-        ItemKind::Use { path, .. } => {
-            Some(path.segments.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::"))
-        }
-        _ => None,
-    });
-    paths.collect()
+    let listed = texts.iter().filter(|text| text.module == "std::prelude");
+    listed.flat_map(|text| library::imported(&text.tree)).collect()
 }
 
 fn of_text(text: &Text, everywhere: &[String]) -> Vec<Substance> {

@@ -6,8 +6,8 @@ use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Clause, ClauseKind, Name, Sig};
-use crate::listing::joined;
 use crate::names::verb_text;
+use matterix_ir::listing::joined;
 
 /// Names of failures, each with the first statement that it comes from.
 type Escapes = BTreeMap<String, Span>;

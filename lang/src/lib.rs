@@ -20,7 +20,6 @@ pub mod inventory;
 mod labs;
 mod labware;
 pub mod library;
-mod listing;
 pub mod load;
 pub mod loader;
 pub mod lower;

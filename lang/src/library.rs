@@ -34,6 +34,16 @@ pub fn read(index: usize, file: FileId) -> (ast::File, Vec<Diagnostic>) {
     }
 }
 
+/// The modules that a tree imports, as it names them: of the prelude those that every file sees.
+pub fn imported(tree: &ast::File) -> impl Iterator<Item = String> {
+    tree.items.iter().filter_map(|item| match &item.kind {
+        ast::ItemKind::Use { path, .. } => {
+            Some(path.segments.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::"))
+        }
+        _ => None,
+    })
+}
+
 /// The tree of a module, with spans in its text.
 pub fn tree(index: usize) -> ast::File {
     read(index, FileId(FIRST + index as u32)).0

@@ -3,16 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use matterix_ir::listing::joined;
 use matterix_lang::catalogue::{Catalogue, Found, Source, Stated, Substance};
 use serde_json::{Value, json};
 
 use crate::Exit;
 use crate::args::{SubstanceArgs, SubstanceFormat};
 use crate::files;
+use crate::report::wrap;
 use crate::terminal::{Stream, print, print_error};
 
 /// Columns of a page, and of the names of its properties.
-const WIDTH: usize = 100;
+const WIDTH: usize = 99;
 const NAMES: usize = 22;
 
 /// Prints what is known of a substance and where each number comes from.
@@ -30,11 +32,10 @@ fn attempt(args: &SubstanceArgs) -> Result<Exit, String> {
     let Some((first, others)) = found.split_first() else {
         print_error(&format!("there is no substance `{word}`"));
         let near: Vec<String> = catalogue.near(word).iter().map(|name| format!("`{name}`")).collect();
-        let help = match near.split_last() {
-            None => "give a name, a formula, a CAS number or a SMILES; `--file` also looks in a file of your own"
+        let help = match near.as_slice() {
+            [] => "give a name, a formula, a CAS number or a SMILES; `--file` also looks in a file of your own"
                 .to_string(),
-            Some((only, [])) => format!("did you mean {only}?"),
-            Some((last, before)) => format!("did you mean {} or {last}?", before.join(", ")),
+            all => format!("did you mean {}?", joined(all, "or")),
         };
         print(Stream::Err, &format!("help: {help}\n"));
         return Ok(Exit::Findings);
@@ -127,15 +128,12 @@ fn note(stated: &Stated) -> String {
 
 /// A text over lines, each behind an indent, the later ones further in.
 fn wrapped(indent: &str, text: &str) -> String {
-    let (mut out, mut line) = (String::new(), indent.to_string());
-    for word in text.split_whitespace() {
-        if line.len() > indent.len() + 2 && line.chars().count() + 1 + word.chars().count() > WIDTH {
-            out += &format!("{}\n", line.trim_end());
-            line = format!("{indent}  ");
-        }
-        line += &format!("{word} ");
-    }
-    out + line.trim_end() + "\n"
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let lines = wrap(&words.join(" "), WIDTH, indent.len(), indent.len() + 2);
+    let line = |(i, line): (usize, String)| {
+        format!("{}\n", format!("{indent}{}{line}", if i == 0 { "" } else { "  " }).trim_end())
+    };
+    lines.into_iter().enumerate().map(line).collect()
 }
 
 fn object(s: &Substance) -> Value {

@@ -203,7 +203,7 @@ fn paragraph(head: &str, painted: &str, text: &str, look: Look, out: &mut String
 }
 
 /// Breaks at blanks so that no line is wider than `width` after its indent, as far as words allow.
-fn wrap(text: &str, width: usize, first_indent: usize, indent: usize) -> Vec<String> {
+pub fn wrap(text: &str, width: usize, first_indent: usize, indent: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     let mut column = first_indent;
     for word in text.split(' ') {

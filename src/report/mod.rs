@@ -13,6 +13,7 @@ use std::fmt;
 use matterix_ir::hidden::visible;
 use matterix_ir::{Diagnostic, Severity, Sources};
 
+pub use human::wrap;
 use text::Texts;
 
 /// The form in which findings are shown.

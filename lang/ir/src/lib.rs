@@ -16,6 +16,7 @@
 //! - [`script`]: what stands for a workflow in files that other programs run.
 //! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
+//! - [`listing`]: names in a row, for all who write for people.
 
 pub mod bodies;
 pub mod codes;
@@ -30,6 +31,7 @@ pub mod hidden;
 pub mod inertia;
 pub mod interval;
 pub mod inventory;
+pub mod listing;
 pub mod math;
 pub mod mesh;
 pub mod message;

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp, apply};
+use crate::listing::joined;
 
 /// So many operations are followed where values are not known.
 const MOST_FOLLOWED: usize = 64;
@@ -32,10 +33,10 @@ pub fn why(graph: &Graph, operation: NodeId) -> String {
                 let more = names.split_off(MOST_NAMED - 1).len();
                 names.push(format!("{more} more"));
             }
-            return match names.split_last() {
-                Some((last, [])) => format!("no amounts meet the equilibrium {last}"),
-                Some((last, rest)) => format!("no amounts meet the equilibria {} and {last} together", rest.join(", ")),
-                None => "no amounts meet the equilibria".into(),
+            return match names.as_slice() {
+                [] => "no amounts meet the equilibria".into(),
+                [one] => format!("no amounts meet the equilibrium {one}"),
+                all => format!("no amounts meet the equilibria {} together", joined(all, "and")),
             };
         }
         _ => "it is too large, or endless less endless",

@@ -15,9 +15,9 @@ use crate::declare::equilibria::{ANALYTIC, CONSTANTS, POTENTIAL};
 use crate::declare::species::field;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::{Elaborator, Mode};
-use crate::listing::joined;
 use crate::names::DeclId;
 use crate::units::Dimension;
+use matterix_ir::listing::joined;
 
 /// Gas constant, J/(mol*K).
 const GAS: f64 = 8.314_462_618_153_24;
@@ -235,7 +235,6 @@ impl<'a> Elaborator<'a> {
     /// What is there of a species; where `split` with what salts, acids and bases will give of it.
     fn held(&mut self, id: InstanceId, s: SpeciesId, split: bool) -> NodeId {
         let here: Vec<(SpeciesId, u32)> = self.amounts_in(id).collect();
-        let at_start = self.mode().at_start;
         let mut sum = self.graph.number(0.0);
         for (other, state) in here {
             let count = match other == s {
@@ -249,10 +248,7 @@ impl<'a> Elaborator<'a> {
             if count == 0.0 {
                 continue;
             }
-            let amount = match at_start {
-                true => self.states[state as usize].initial,
-                false => self.graph.add(Op::State(state)),
-            };
+            let amount = self.as_put(state);
             let count = self.graph.number(count);
             let part = self.graph.binary(BinaryOp::Mul, count, amount);
             sum = self.graph.binary(BinaryOp::Add, sum, part);
@@ -563,9 +559,16 @@ impl<'a> Elaborator<'a> {
     pub fn put_in(&mut self, id: InstanceId, s: SpeciesId) -> NodeId {
         let state = self.amounts_in(id).find(|(other, _)| *other == s).map(|(_, state)| state);
         match state {
-            Some(state) if self.mode().at_start => self.states[state as usize].initial,
-            Some(state) => self.graph.add(Op::State(state)),
+            Some(state) => self.as_put(state),
             None => self.graph.number(0.0),
+        }
+    }
+
+    /// An amount as a state has it, or as it is at the start.
+    fn as_put(&mut self, state: u32) -> NodeId {
+        match self.mode().at_start {
+            true => self.states[state as usize].initial,
+            false => self.graph.add(Op::State(state)),
         }
     }
 

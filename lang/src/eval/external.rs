@@ -284,15 +284,15 @@ impl Elaborator<'_> {
             }
             (Bound::Balanced, [Value::Species(s)]) => {
                 let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(*s));
-                Value::Bool(self.graph.number(f64::from(u8::from(is_balanced))))
+                self.certain(is_balanced)
             }
             (Bound::Settles, [Value::Instance(m), Value::Species(s)]) => {
                 let has = self.speciation(*m).is_some_and(|speciation| speciation.place(*s).is_some());
-                Value::Bool(self.graph.number(f64::from(u8::from(has))))
+                self.certain(has)
             }
             (Bound::Solid, [Value::Species(s)]) => {
                 let is_solid = self.is_solid(*s);
-                Value::Bool(self.graph.number(f64::from(u8::from(is_solid))))
+                self.certain(is_solid)
             }
             (Bound::Put, [Value::Instance(m), Value::Species(s)]) => {
                 let node = self.put_in(*m, *s);
@@ -304,7 +304,7 @@ impl Elaborator<'_> {
             }
             (Bound::Opposed(apart), [Value::Species(a), Value::Species(b)]) => {
                 let holds = self.tables.equilibria.iter().any(|e| e.sides(*a, *b).is_some_and(|same| same != *apart));
-                Value::Bool(self.graph.number(f64::from(u8::from(holds))))
+                self.certain(holds)
             }
             (Bound::Settled, [Value::Instance(m), Value::Num(otherwise)]) => {
                 let node = self.settled(*m, |_| Some(Part::Temperature)).unwrap_or(otherwise.node);
@@ -336,6 +336,11 @@ impl Elaborator<'_> {
             Some(ty) => self.coerce(computed, &ty, at, name),
             None => computed,
         }
+    }
+
+    /// A truth that is known before anything runs.
+    fn certain(&mut self, truth: bool) -> Value {
+        Value::Bool(self.graph.number(f64::from(u8::from(truth))))
     }
 
     fn choose(&mut self, c: NodeId, a: Value, b: Value, at: Span) -> Value {

@@ -178,9 +178,7 @@ impl<'a> Names<'a> {
     fn prelude(&self) -> BTreeMap<Arc<str>, DeclId> {
         let mut scope = BTreeMap::new();
         let Some(prelude) = self.module_index("std::prelude") else { return scope };
-        for item in &self.modules[prelude].tree.items {
-            let ItemKind::Use { path, .. } = &item.kind else { continue };
-            let name = path.segments.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
+        for name in library::imported(&self.modules[prelude].tree) {
             if let Some(module) = self.module_index(&name) {
                 scope.extend(self.own[module].iter().map(|(k, v)| (k.clone(), *v)));
             }

@@ -8,7 +8,7 @@ use matterix_ir::{Env, NodeId};
 
 use super::list::{List, Step, table};
 use super::{Prose, words};
-use crate::listing::joined;
+use matterix_ir::listing::joined;
 
 impl Prose<'_, '_> {
     /// The sections before the steps.

@@ -19,10 +19,10 @@ use crate::declare::Tables;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
-use crate::listing::joined;
 use crate::lower::Planner;
 use crate::names::DeclId;
 use crate::task::{self, Task};
+use matterix_ir::listing::joined;
 
 use list::List;
 

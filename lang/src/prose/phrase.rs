@@ -3,7 +3,7 @@
 use super::{Prose, words};
 use crate::ast::{Binary, Expr, ExprKind, MemberKind, Name, Role, Text, TextPart, Unary};
 use crate::eval::Value;
-use crate::listing::joined;
+use matterix_ir::listing::joined;
 
 impl<'a> Prose<'a, '_> {
     /// What an expression is called; what constants settle is said with its value.

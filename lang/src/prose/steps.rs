@@ -4,7 +4,7 @@ use super::list::{Group, List, Step};
 use super::{Prose, words};
 use crate::ast::{Binary, Block, Expr, ExprKind, Handlers, Stmt, StmtKind};
 use crate::eval::Value;
-use crate::listing::joined;
+use matterix_ir::listing::joined;
 
 /// At most so many members of a set are listed.
 const MOST_LISTED: usize = 12;

@@ -16,7 +16,7 @@ pub fn page(library: &Library) -> String {
         .map(|m| {
             let first: Vec<String> = m.tree.docs.iter().take_while(|l| !l.trim().is_empty()).cloned().collect();
             let about = cell(&first);
-            let prelude = if listed.iter().any(|l| l == m.short()) { "yes" } else { "" };
+            let prelude = if listed.iter().any(|l| l == m.name) { "yes" } else { "" };
             vec![format!("[`{}`]({}.md)", m.name, m.short()), prelude.to_string(), first_sentence(&about).to_string()]
         })
         .collect();

@@ -58,7 +58,7 @@ pub fn assets() -> String {
 pub fn species() -> String {
     let library = Library::read();
     let everywhere = library.prelude();
-    let list = |m: &Module| tables::species_list(m, everywhere.iter().any(|name| name == m.short()));
+    let list = |m: &Module| tables::species_list(m, everywhere.iter().any(|name| name == m.name));
     library.modules.iter().map(list).collect()
 }
 
@@ -104,11 +104,7 @@ impl Library {
     /// The names that the prelude lists.
     fn prelude(&self) -> Vec<String> {
         let listed = self.modules.iter().find(|m| m.short() == "prelude");
-        let uses = listed.into_iter().flat_map(|m| &m.tree.items).filter_map(|item| match &item.kind {
-            ItemKind::Use { path, .. } => path.segments.last().map(|s| s.text.clone()),
-            _ => None,
-        });
-        uses.collect()
+        listed.into_iter().flat_map(|m| library::imported(&m.tree)).collect()
     }
 }
 

@@ -12,8 +12,15 @@ pub fn page(library: &Library, module: &Module) -> String {
     let listed = library.prelude();
     let short = module.short();
     out += &if short == "prelude" {
-        format!("{}\n\n", listed.iter().map(|m| format!("[`std::{m}`]({m}.md)")).collect::<Vec<_>>().join(", "))
-    } else if listed.iter().any(|m| m == short) {
+        format!(
+            "{}\n\n",
+            listed
+                .iter()
+                .map(|m| format!("[`{m}`]({}.md)", m.trim_start_matches("std::")))
+                .collect::<Vec<_>>()
+                .join(", ")
+        )
+    } else if listed.iter().any(|m| m == module.name) {
         format!(
             "In the [prelude](prelude.md): its names are there without `use`. Source: [stdlib/{short}.mtx](../../stdlib/{short}.mtx).\n\n"
         )

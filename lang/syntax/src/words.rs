@@ -1,5 +1,7 @@
 //! The grammar's rules in the user's words.
 
+use matterix_ir::listing::joined;
+
 use super::grammar::Rule;
 
 /// What a rule stands for where it is expected; `None` for what is never worth saying.
@@ -88,9 +90,5 @@ pub(super) fn expected(rules: &[Rule]) -> Vec<&'static str> {
 
 /// `a`, `a or b`, `a, b or c`.
 pub(super) fn either(words: &[&str]) -> String {
-    match words {
-        [] => "something else".to_owned(),
-        [one] => (*one).to_owned(),
-        [all @ .., last] => format!("{} or {last}", all.join(", ")),
-    }
+    if words.is_empty() { "something else".to_owned() } else { joined(words, "or") }
 }

@@ -1,5 +1,6 @@
 //! Operations of the graph in the words of whoever wrote the laws: what fails, and the values of what it is made of.
 
+use matterix_ir::listing::joined;
 use matterix_ir::model::Domain;
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp, Unit, undefined};
 
@@ -37,8 +38,7 @@ impl Engine<'_> {
         let shown: Vec<String> = values.into_iter().map(|(name, value)| format!("`{name}` is {value}")).collect();
         match shown.as_slice() {
             [] => String::new(),
-            [one] => format!(", where {one}"),
-            [most @ .., last] => format!(", where {} and {last}", most.join(", ")),
+            all => format!(", where {}", joined(all, "and")),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Quantities and words as people read them.
 
 use matterix_ir::Unit;
+use matterix_ir::listing::joined;
 use matterix_ir::points::{Fact, Value};
 use matterix_ir::quantity::show_number;
 
@@ -19,7 +20,7 @@ pub(super) fn value(value: &Value) -> String {
             all.dedup();
             match all.as_slice() {
                 [first, .., last] if all.len() > MOST => with_unit(format!("{first} .. {last}"), unit),
-                _ => with_unit(one_of(&all), unit),
+                _ => with_unit(joined(&all, "or"), unit),
             }
         }
         Value::Between(Some(low), Some(high), unit) => {
@@ -35,7 +36,7 @@ pub(super) fn value(value: &Value) -> String {
         Value::Between(None, None, _) | Value::Unknown => "not known".to_string(),
         Value::Words(words) => match words.as_slice() {
             [first, .., last] if words.len() > MOST => format!("one of {} from {first} to {last}", words.len()),
-            _ => one_of(words),
+            _ => joined(words, "or"),
         },
     }
 }
@@ -69,13 +70,6 @@ pub(super) fn time(known: &Value) -> String {
 /// A number with five significant digits.
 fn short(value: f64) -> String {
     show_number(format!("{value:.4e}").parse().unwrap_or(value))
-}
-
-fn one_of(all: &[String]) -> String {
-    match all {
-        [rest @ .., last] if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => all.concat(),
-    }
 }
 
 fn with_unit(number: String, unit: &Unit) -> String {

@@ -60,8 +60,7 @@ impl Rest {
     fn begin(&self, free: &Problem<'_>, solution: &Solution, activity: f64) -> Option<(Vec<f64>, Vec<usize>)> {
         let point = solution.point.as_ref()?;
         let of = |i: &usize| self.part(*i).map_or(activity, |i| solution.activities[i]);
-        let mut start: Vec<f64> = free.basis.masters.iter().map(of).collect();
-        start.extend_from_slice(&point.x[point.basis.masters.len()..]);
+        let start = point.unknowns(free.basis.masters.iter().map(of));
         Some((start, point.basis.held.iter().map(|i| self.whole(*i)).collect()))
     }
 

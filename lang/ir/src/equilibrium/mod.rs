@@ -17,6 +17,8 @@ mod linear;
 mod memo;
 mod newton;
 mod problem;
+#[cfg(test)]
+mod sketch;
 mod slopes;
 mod solve;
 mod state;

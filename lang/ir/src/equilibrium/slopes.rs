@@ -142,8 +142,8 @@ fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
                 rows[warmth] += (state.enthalpies[i] + state.capacities[i] * state.warmer) / scale;
             }
         }
-        Role::Bystanders => rows[places.strength()] -= problem.by_amount(state.charges, state),
-        Role::BystanderAmount => rows[places.molality()] -= problem.by_amount(state.dissolved, state),
+        Role::Bystanders => rows[places.strength()] -= state.by_charges,
+        Role::BystanderAmount => rows[places.molality()] -= state.by_dissolved,
         Role::Reference if isothermal => rows[warmth] -= 1.0,
         _ if isothermal => {}
         Role::Heat => rows[warmth] += 1.0 / scale,

@@ -55,6 +55,11 @@ pub(super) struct Point {
 }
 
 impl Point {
+    /// Unknowns near these by another basis, of which the masters have these logarithms of activities.
+    pub(super) fn unknowns(&self, masters: impl Iterator<Item = f64>) -> Vec<f64> {
+        masters.chain(self.x[self.basis.masters.len()..].iter().copied()).collect()
+    }
+
     /// How conditions move with the unknowns; none where that has no inverse.
     pub(super) fn factors(&self, problem: &Problem<'_>) -> Option<Factors> {
         let mut matrix = Matrix::default();
@@ -101,12 +106,12 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
     }
     let found = follow(&free, &start, &lacking, given);
     let found = found.or_else(|| follow(&free, &start, &lacking, Vec::new()));
-    found.or_else(|| by_temperature(&free, start, &lacking))
+    found.or_else(|| by_temperature(&free, &lacking))
 }
 
 /// The solution where the heat content and the rest are hard to meet at once: the temperature is bracketed, as a heat content grows with
 /// it, and then all goes on from there.
-fn by_temperature(free: &Problem<'_>, mut start: Vec<f64>, lacking: &[f64]) -> Option<Solution> {
+fn by_temperature(free: &Problem<'_>, lacking: &[f64]) -> Option<Solution> {
     if free.is_isothermal() {
         return None;
     }
@@ -129,9 +134,7 @@ fn by_temperature(free: &Problem<'_>, mut start: Vec<f64>, lacking: &[f64]) -> O
         last = Some(solution);
     }
     let Solution { activities, point: Some(point), .. } = last? else { return None };
-    let masters = free.basis.masters.len();
-    free.basis.masters.iter().enumerate().for_each(|(c, i)| start[c] = activities[*i]);
-    start[masters..].copy_from_slice(&point.x[point.basis.masters.len()..]);
+    let start = point.unknowns(free.basis.masters.iter().map(|i| activities[*i]));
     follow(free, &start, lacking, point.basis.held.clone())
 }
 

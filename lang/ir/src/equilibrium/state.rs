@@ -3,7 +3,7 @@
 use super::activity::Coefficient;
 use super::linear::Matrix;
 use super::problem::{Problem, Totals};
-use super::{Member, Phase, rises, terms};
+use super::{Phase, rises, terms};
 use crate::math;
 
 /// Ions per mass of solvent that do not matter, mol/kg.
@@ -36,6 +36,9 @@ pub(super) struct State {
     pub(super) charges: f64,
     /// All that is dissolved, mol.
     pub(super) dissolved: f64,
+    /// How much the conditions of both grow with each mol of them.
+    pub(super) by_charges: f64,
+    pub(super) by_dissolved: f64,
     /// How far each condition is from being met.
     pub(super) residuals: Vec<f64>,
 }
@@ -67,6 +70,7 @@ impl Problem<'_> {
         state.charges = charges + self.args[self.layout.bystanders()];
         state.dissolved = dissolved + self.args[self.layout.bystander_amount()];
         state.amounts[basis.water] = math::exp(x[places.solvent()]) / self.system.written.solvent_mass;
+        [state.by_charges, state.by_dissolved] = [state.charges, state.dissolved].map(|sum| self.by_amount(sum, state));
         self.balances(state, totals);
         self.energy(state, temperature);
         for (place, sum) in self.sums(state) {
@@ -157,9 +161,6 @@ impl Problem<'_> {
     /// How conditions move with the unknowns, as many of them as are free.
     pub(super) fn jacobian(&self, state: &State, free: usize, matrix: &mut Matrix) {
         let (basis, places) = (&*self.basis, self.places());
-        let (is_near, is_warm) = (places.strength() < free, places.temperature() < free && !self.is_isothermal());
-        let [by_charges, by_dissolved] = [state.charges, state.dissolved].map(|sum| self.by_amount(sum, state));
-        let by_energy = -1.0 / self.energy_scale();
         matrix.clear(free);
         for &i in &basis.solutes {
             let (amount, coefficient, parts) = (state.amounts[i], &state.coefficients[i], basis.masters_of.row(i));
@@ -170,21 +171,7 @@ impl Problem<'_> {
                 // Those that are not free are cut off.
                 row[basis.masters.len()..].iter_mut().zip(&others).for_each(|(to, by)| *to += share * by);
             };
-            for (row, of) in basis.parts.row(i) {
-                let share = of * state.inverse[*row][usize::from(*of < 0.0)];
-                add(matrix.row_mut(*row), share * amount);
-            }
-            if is_near {
-                let charge = basis.charges[i];
-                if charge != 0.0 {
-                    add(matrix.row_mut(places.strength()), -0.5 * charge * charge * by_charges * amount);
-                }
-                add(matrix.row_mut(places.molality()), -by_dissolved * amount);
-            }
-            if is_warm {
-                let heat = state.enthalpies[i] + state.capacities[i] * state.warmer;
-                add(matrix.row_mut(places.temperature()), heat * by_energy * amount);
-            }
+            self.each_row(i, state, free, |row, share| add(matrix.row_mut(row), share * amount));
         }
         let amount = state.amounts[basis.water];
         self.each_row(basis.water, state, free, |row, share| *matrix.at(row, places.solvent()) += share * amount);
@@ -194,7 +181,7 @@ impl Problem<'_> {
             *matrix.at(row, places.solvent()) += per_mass / (per_mass + NO_IONS);
         }
         if places.temperature() < free {
-            let by_warmth = if is_warm { state.capacity * by_energy } else { 1.0 };
+            let by_warmth = if self.is_isothermal() { 1.0 } else { -state.capacity / self.energy_scale() };
             *matrix.at(places.temperature(), places.temperature()) += by_warmth;
         }
     }
@@ -210,20 +197,22 @@ impl Problem<'_> {
     }
 
     /// How much the molality of such an amount should grow with it, as a share of itself.
-    pub(super) fn by_amount(&self, amount: f64, state: &State) -> f64 {
+    fn by_amount(&self, amount: f64, state: &State) -> f64 {
         self.per_mass(1.0, state) / (self.per_mass(amount, state) + NO_IONS)
     }
 
-    /// The conditions that move with the amount of a member, of the first ones that are free, and by how much.
+    /// The conditions that move with the amount of a member that is dissolved, or of the solvent, of the first ones that are free, and by how much.
     fn each_row(&self, member: usize, state: &State, free: usize, mut visit: impl FnMut(usize, f64)) {
         let places = self.places();
         for (row, of) in self.basis.parts.row(member) {
             visit(*row, of * state.inverse[*row][usize::from(*of < 0.0)]);
         }
-        let Member { charge, phase, .. } = self.system.members()[member];
-        if phase == Phase::Solute && places.strength() < free {
-            visit(places.strength(), -0.5 * charge * charge * self.by_amount(state.charges, state));
-            visit(places.molality(), -self.by_amount(state.dissolved, state));
+        if member != self.basis.water && places.strength() < free {
+            let charge = self.basis.charges[member];
+            if charge != 0.0 {
+                visit(places.strength(), -0.5 * charge * charge * state.by_charges);
+            }
+            visit(places.molality(), -state.by_dissolved);
         }
         if !self.is_isothermal() && places.temperature() < free {
             let heat = state.enthalpies[member] + state.capacities[member] * state.warmer;

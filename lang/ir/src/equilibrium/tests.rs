@@ -1,67 +1,10 @@
+use super::sketch::{LN_10, Sketch};
 use super::*;
 
-const LN_10: f64 = std::f64::consts::LN_10;
-
-/// J/(mol*K).
-const GAS: f64 = 8.314_462_618_153_24;
-
-/// Builds systems by short texts.
-struct Sketch {
-    written: Written,
-    /// The first two terms of each.
-    constants: Vec<[f64; 2]>,
-    enthalpies: Vec<f64>,
-}
-
 impl Sketch {
-    fn new() -> Sketch {
-        let water = Member { name: "water".into(), phase: Phase::Solvent, charge: 0.0 };
-        let written = Written { members: vec![water], equations: Vec::new(), solvent_mass: 0.018_015 };
-        Sketch { written, constants: Vec::new(), enthalpies: Vec::new() }
-    }
-
-    fn member(&mut self, name: &str) -> usize {
-        if let Some(known) = self.written.members.iter().position(|m| m.name == name) {
-            return known;
-        }
-        let phase = match name {
-            "e-" => Phase::Formal,
-            name if name.ends_with("(s)") => Phase::Solid,
-            _ => Phase::Solute,
-        };
-        let signs = |sign: char| name.chars().rev().take_while(|c| *c == sign).count() as f64;
-        let charge = signs('+') - signs('-');
-        self.written.members.push(Member { name: name.into(), phase, charge });
-        self.written.equations.iter_mut().for_each(|e| e.coefficients.push(0.0));
-        self.written.members.len() - 1
-    }
-
-    /// `-1 HA 1 H+ 1 A-` with log10 K and kJ/mol.
-    fn equation(mut self, text: &str, log: f64, enthalpy: f64) -> Sketch {
-        let words: Vec<&str> = text.split(' ').collect();
-        let mut found = Vec::new();
-        for pair in words.chunks(2) {
-            found.push((self.member(pair[1]), pair[0].parse::<f64>().unwrap()));
-        }
-        let mut coefficients = vec![0.0; self.written.members.len()];
-        found.into_iter().for_each(|(i, n)| coefficients[i] += n);
-        self.written.equations.push(Equation { name: text.into(), coefficients });
-        self.constants.push([log * LN_10 + enthalpy * 1e3 / (GAS * 298.15), -enthalpy * 1e3 / GAS]);
-        self.enthalpies.push(enthalpy * 1e3);
-        self
-    }
-
     fn build(self) -> Mixture {
-        let system = System::try_from(self.written).unwrap();
-        let layout = system.layout();
-        let mut args = vec![0.0; layout.count()];
+        let (system, mut args) = self.ready().unwrap();
         args[MOST] = 1e9;
-        for (r, (k, h)) in self.constants.iter().zip(&self.enthalpies).enumerate() {
-            args[layout.constant(r)..layout.constant(r) + 2].copy_from_slice(k);
-            args[layout.enthalpy(r)] = *h;
-        }
-        args[layout.capacity()] = f64::INFINITY;
-        args[layout.reference()] = 298.15;
         Mixture { system, args }
     }
 }
@@ -294,20 +237,8 @@ fn what_is_no_number_is_not_met() {
     assert_eq!(newton::largest(&[1.0, -3.0, 0.0]), 3.0);
 }
 
-/// Half-cells, with log10 K from potentials in V.
-fn half_cells() -> Sketch {
-    let log = |electrons: f64, potential: f64| electrons * potential / 0.059_159_6;
-    Sketch::new()
-        .equation("-1 water 1 H+ 1 OH-", -14.0, 55.8)
-        .equation("-1 Fe+++ -1 e- 1 Fe++", log(1.0, 0.771), 0.0)
-        .equation("-1 Ce++++ -1 e- 1 Ce+++", log(1.0, 1.72), 0.0)
-        .equation("-1 MnO4- -8 H+ -5 e- 1 Mn++ 4 water", log(5.0, 1.507), 0.0)
-        .equation("-1 Cu++ -2 e- 1 Cu(s)", log(2.0, 0.3419), 0.0)
-        .equation("-1 Zn++ -2 e- 1 Zn(s)", log(2.0, -0.7618), 0.0)
-}
-
 fn potential(all: &[(&str, f64)]) -> f64 {
-    let mixture = half_cells().build().with(&[("water", WATER), ("H+", 1.0)]).with(all);
+    let mixture = Sketch::half_cells().build().with(&[("water", WATER), ("H+", 1.0)]).with(all);
     -mixture.system.value(Part::Activity(mixture.find("e-")), &mixture.args) / LN_10 * 0.059_159_6
 }
 
@@ -327,19 +258,19 @@ fn a_redox_titration_passes_its_end_point() {
     near(potential(&[("Fe++", 0.1), ("Ce++++", 0.1)]), 0.5 * (0.771 + 1.72));
     near(potential(&[("Fe++", 0.1), ("Ce++++", 0.2)]), 1.72);
     // Permanganate takes up five electrons and eight protons.
-    let before = half_cells().build().with(&[("water", WATER), ("H+", 1.0), ("Fe++", 0.1), ("MnO4-", 0.01)]);
+    let before = Sketch::half_cells().build().with(&[("water", WATER), ("H+", 1.0), ("Fe++", 0.1), ("MnO4-", 0.01)]);
     assert!((before.amount("Fe+++") - 0.05).abs() < 1e-9, "{}", before.amount("Fe+++"));
     assert!((before.amount("H+") - 0.92).abs() < 1e-9, "{}", before.amount("H+"));
     assert_eq!(before.amount("e-"), 0.0);
     // The potential at the end point lies between the two by the electrons that each takes.
-    let end = half_cells().build().with(&[("water", WATER), ("H+", 1.16), ("Fe++", 0.1), ("MnO4-", 0.02)]);
+    let end = Sketch::half_cells().build().with(&[("water", WATER), ("H+", 1.16), ("Fe++", 0.1), ("MnO4-", 0.02)]);
     let at = -end.system.value(Part::Activity(end.find("e-")), &end.args) / LN_10 * 0.059_159_6;
     near(at, (0.771 + 5.0 * 1.507) / 6.0);
 }
 
 #[test]
 fn metals_plate_out_and_dissolve() {
-    let mixture = half_cells().build().with(&[("water", WATER), ("Cu++", 0.1), ("Zn(s)", 0.3)]);
+    let mixture = Sketch::half_cells().build().with(&[("water", WATER), ("Cu++", 0.1), ("Zn(s)", 0.3)]);
     assert!((mixture.amount("Cu(s)") - 0.1).abs() < 1e-9, "{}", mixture.amount("Cu(s)"));
     assert!((mixture.amount("Zn(s)") - 0.2).abs() < 1e-9, "{}", mixture.amount("Zn(s)"));
     assert!((mixture.amount("Zn++") - 0.1).abs() < 1e-9, "{}", mixture.amount("Zn++"));

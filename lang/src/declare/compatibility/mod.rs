@@ -17,8 +17,8 @@ use matterix_ir::{Severity, Span};
 use crate::chem::Pattern;
 use crate::declare::species::SpeciesTable;
 use crate::declare::{SpeciesId, tables::ReactionDef};
-use crate::listing::joined;
 use crate::names::DeclId;
+use matterix_ir::listing::joined;
 
 pub use consequence::Consequence;
 pub use member::Seat;
