@@ -124,7 +124,7 @@ def saturated(numbers, formula, water, percent, celsius):
 
 
 def crystallising(row):
-    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a salt, by least squares."""
+    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a salt, by least squares; how far off; their sources."""
     numbers = sides(row["equation"])
     salt = next(name for name, count in numbers.items() if count < 0)
     points = [point for point in table("solubilities.csv") if point["salt"] == salt]
@@ -138,7 +138,8 @@ def crystallising(row):
     a, b, c = solved(matrix, [sum(row_[i] * value for row_, value in zip(basis, logs)) for i in range(3)])
     worst = max(abs(sum(x * y for x, y in zip((a, b, c), row_)) - value) for row_, value in zip(basis, logs))
     order = sum(count for name, count in numbers.items() if count > 0 and name != "water")
-    return [round(a - c * math.log10(T0), 5), 0, round(1e3 * b, 3), round(c, 5)], 100 * (10 ** (worst / order) - 1)
+    names = sorted({point["source"] for point in points})
+    return [round(a - c * math.log10(T0), 5), 0, round(1e3 * b, 3), round(c, 5)], 100 * (10 ** (worst / order) - 1), names
 
 
 def mass(formula):
@@ -186,8 +187,9 @@ def equilibrium(row):
         constant = "analytic: [" + ", ".join(number(x) for x in row["analytic"].split()) + "]"
         sources = tag(row["source"])
     elif row["kind"] == "solubility":
-        numbers, worst = crystallising(row)
+        numbers, worst, names = crystallising(row)
         constant = "analytic: [" + ", ".join(number(x) for x in numbers) + "]"
+        sources = tag(*names)
         said = [f"    // met within {max(worst, 0.1):.1f} %"]
     elif row["capacity"] and row["kind"] == "pka":
         constant = "analytic: [" + ", ".join(number(x) for x in analytic(row)) + "]"
