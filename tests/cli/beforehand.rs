@@ -41,6 +41,17 @@ fn kept(dir: &Path) -> Vec<PathBuf> {
     kept
 }
 
+/// How many checks without findings are kept. A file of the cache holds those whose keys begin alike.
+fn clean(dir: &Path) -> usize {
+    let files = kept(dir).into_iter().filter(|f| f.to_string_lossy().contains(CLEAN));
+    let entries = |file: PathBuf| {
+        let text = fs::read_to_string(file).expect("the cache");
+        let (_seal, list) = text.split_once('\n').expect("a seal and a list");
+        serde_json::from_str::<Vec<serde_json::Value>>(list).expect("a list").len()
+    };
+    files.map(entries).sum()
+}
+
 #[test]
 fn a_failure_that_is_handled_is_a_warning() {
     let dir = folder("beforehand_handled");
@@ -115,7 +126,6 @@ fn what_was_planned_is_remembered_and_said_in_the_same_bytes() {
 #[test]
 fn a_file_without_findings_is_looked_through_again_when_what_it_read_has_changed() {
     let dir = folder("beforehand_clean");
-    let clean = |dir: &Path| kept(dir).iter().filter(|f| f.to_string_lossy().contains(CLEAN)).count();
     let text = "mtx 1\nuse rooms\n\nworkflow pause in room {\n    wait stay\n}\n";
     let room = |stay: &str| format!("mtx 1\nlab room {{ ambient: 22 degC }}\nconst stay: Duration = {stay}\n");
     write(&dir, "rooms.mtx", room("1 min"));
@@ -135,7 +145,6 @@ fn a_file_without_findings_is_looked_through_again_when_what_it_read_has_changed
 #[test]
 fn advice_that_is_not_shown_is_not_looked_for_again() {
     let dir = folder("beforehand_advice");
-    let clean = |dir: &Path| kept(dir).iter().filter(|f| f.to_string_lossy().contains(CLEAN)).count();
     let text = "mtx 1\nuse std::glassware::Beaker50mL\n\nlab room {\n    ambient: 22 degC\n    cup = Beaker50mL\n    \
                 jug = Beaker50mL holding 9 mL of water\n}\n\nworkflow look in room {\n    expect jug.volume > 1 mL\n}\n";
     assert_eq!(check(&dir, text, &[]), "");
