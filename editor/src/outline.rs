@@ -91,6 +91,7 @@ fn item(item: &Item) -> Option<Symbol> {
         ItemKind::Material { .. } => ("material", SymbolKind::Substance),
         ItemKind::Reaction { .. } => ("reaction", SymbolKind::Reaction),
         ItemKind::Equilibrium { .. } => ("equilibrium", SymbolKind::Reaction),
+        ItemKind::Interaction { .. } => ("interaction", SymbolKind::Reaction),
         ItemKind::Hazard { .. } => ("hazard", SymbolKind::Law),
         ItemKind::Process(_) => ("process", SymbolKind::Law),
         ItemKind::Event(_) => ("event", SymbolKind::Law),

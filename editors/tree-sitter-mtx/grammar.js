@@ -276,7 +276,7 @@ module.exports = grammar({
 
     // ---- declarations
     declaration: ($) => choice(
-      $.use, $.dimension, $.unit_declaration, $.species_declaration, $.solution, $.reaction, $.capability, $.asset, $.process, $.event,
+      $.use, $.dimension, $.unit_declaration, $.species_declaration, $.solution, $.reaction, $.interaction, $.capability, $.asset, $.process, $.event,
       $.relation, $.function, $.constant, $.reactive_group, $.material, $.incompatible, $.allow, $.hazard, $.framing, $.driver, $.lab, $.skill,
       $.workflow, $.study, $.fit, $.test,
     ),
@@ -304,6 +304,7 @@ module.exports = grammar({
       choice('reaction', 'equilibrium'), field('name', $.identifier), ':', nl($), $._side, choice('->', '<->'), nl($), $._side,
       optional($.fields),
     ),
+    interaction: ($) => seq('interaction', field('name', $.identifier), ':', nl($), $._side, optional($.fields)),
     _side: ($) => seq($._side_term, repeat(seq('+', nl($), $._side_term))),
     _side_term: ($) => seq(optional($.number), $.species),
     reactive_group: ($) => seq('reactive_group', field('name', $.identifier), $.fields),

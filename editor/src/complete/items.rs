@@ -13,6 +13,7 @@ const ITEMS: &[(&str, &str)] = &[
     ("species", "species ${1:name} { formula: \"${2:H2O}\", density: ${3:1 g/mL}, heat_capacity: ${4:75 J/(mol*K)} }"),
     ("solution", "solution ${1:name} { ${2:NaCl}: ${3:1 g}, water: ${4:99 g} }"),
     ("equilibrium", "equilibrium ${1:name}: ${2:HA} <-> ${3:H+ + A-} { pka: ${4:4.76} }"),
+    ("interaction", "interaction ${1:name}: ${2:Na+ + Cl-} { b0: ${3:0.0765}, b1: ${4:0.2664}, c0: ${5:0.0013} }"),
     ("reaction", "reaction ${1:name}: ${2:A} -> ${3:B} {\n    rate: ${4:0.01 1/s}, order: { ${2:A}: 1 }\n}"),
     ("reactive_group", "reactive_group ${1:name} { title: \"$2\", members: { ${3:species}: any }, source: \"$4\" }"),
     ("material", "material ${1:name} { source: \"$0\" }"),
@@ -94,6 +95,7 @@ const MANY: &[(&str, &str)] = &[
 const FIELDS: &[(&str, &[&str])] = &[
     ("species", &["formula", "smiles", "reactive_groups", "same_as", "dissolves", "by"]),
     ("reaction", &["rate", "order", "valid", "enthalpy", "template", "requires", "reverse", "reverse_order"]),
+    ("interaction", &["b0", "b1", "b2", "c0", "reach", "theta", "lambda", "psi", "zeta", "source"]),
     (
         "equilibrium",
         &["constant", "log_constant", "pka", "ksp", "pksp", "analytic", "at", "enthalpy", "valid", "source"],
@@ -131,7 +133,7 @@ impl Place<'_> {
             "asset" | "capability" if matches!(last, ":" | ",") => {
                 self.globals(&[Kind::Capability, Kind::Asset], 5, out)
             }
-            "reaction" | "equilibrium" | "solution" | "incompatible" | "allow"
+            "reaction" | "equilibrium" | "interaction" | "solution" | "incompatible" | "allow"
                 if matches!(last, ":" | "+" | "->" | "<->" | "of" | "with" | "incompatible") =>
             {
                 self.globals(&[Kind::Species, Kind::Group, Kind::Material], 5, out);
@@ -201,8 +203,10 @@ impl Place<'_> {
             }
             return;
         }
-        if matches!(item, "species" | "solution" | "reaction" | "equilibrium" | "reactive_group" | "incompatible")
-            && begins
+        if matches!(
+            item,
+            "species" | "solution" | "reaction" | "equilibrium" | "interaction" | "reactive_group" | "incompatible"
+        ) && begins
         {
             return self.globals(&[Kind::Species, Kind::Solution], 10, out);
         }

@@ -252,6 +252,7 @@ fn kind_of(kind: &ItemKind) -> Option<Kind> {
         ItemKind::Solution { .. } => Kind::Solution,
         ItemKind::Reaction { .. } => Kind::Reaction,
         ItemKind::Equilibrium { .. } => Kind::Equilibrium,
+        ItemKind::Interaction { .. } => Kind::Interaction,
         ItemKind::ReactiveGroup { .. } => Kind::Group,
         ItemKind::Material { .. } => Kind::Material,
         ItemKind::Hazard { .. } => Kind::Hazard,

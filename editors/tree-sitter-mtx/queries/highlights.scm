@@ -19,7 +19,7 @@
 ; ---- declarations
 (header "mtx" @keyword)
 [
-  "use" "dimension" "unit" "species" "solution" "reaction" "reactive_group" "material" "incompatible" "allow" "hazard" "caution"
+  "use" "dimension" "unit" "species" "solution" "reaction" "equilibrium" "interaction" "reactive_group" "material" "incompatible" "allow" "hazard" "caution"
   "capability" "asset" "process" "event" "relation" "extern" "fn" "const" "framing" "driver" "lab" "skill" "workflow" "study" "fit" "test"
   "point" "prefixes" "labelled" "symmetric" "also" "any" "where" "when" "per"
 ] @keyword
@@ -91,6 +91,7 @@
 ]
 [
   (reaction name: (identifier) @constant)
+  (interaction name: (identifier) @constant)
   (solution name: (identifier) @constant)
   (material name: (identifier) @constant)
   (reactive_group name: (identifier) @constant)

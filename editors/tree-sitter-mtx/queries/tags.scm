@@ -9,4 +9,5 @@
 (constant name: (identifier) @name) @definition.constant
 (solution name: (identifier) @name) @definition.constant
 (reaction name: (identifier) @name) @definition.constant
+(interaction name: (identifier) @name) @definition.constant
 (species_declaration name: (species) @name) @definition.constant

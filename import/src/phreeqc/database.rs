@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::Wanted;
+use super::{Wanted, interactions};
 use super::lines::{Line, lines};
 use crate::Mistake;
 
@@ -19,6 +19,8 @@ pub struct Database {
     pub species: Vec<Entry>,
     /// Phases.
     pub phases: Vec<Entry>,
+    /// What acts on each other.
+    pub interactions: interactions::Block,
     /// Blocks of other kinds, with the lines where they begin.
     pub others: Vec<(usize, String)>,
 }
@@ -83,6 +85,7 @@ impl Database {
 enum Block {
     Species,
     Phases,
+    Pitzer,
     Other,
 }
 
@@ -97,9 +100,10 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
             block = match keyword {
                 "SOLUTION_SPECIES" => Block::Species,
                 "PHASES" => Block::Phases,
+                "PITZER" => Block::Pitzer,
                 _ => Block::Other,
             };
-            if let Some(law) = ["LLNL_AQUEOUS_MODEL_PARAMETERS", "PITZER", "SIT"].iter().find(|law| **law == keyword) {
+            if let Some(law) = ["LLNL_AQUEOUS_MODEL_PARAMETERS", "SIT"].iter().find(|law| **law == keyword) {
                 let why = format!("`{law}`: this database follows a law of activity that is not known here");
                 return Err(mistake(line, why));
             }
@@ -112,6 +116,10 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
         let into = match block {
             Block::Species => &mut database.species,
             Block::Phases => &mut database.phases,
+            Block::Pitzer => {
+                database.interactions.line(line)?;
+                continue;
+            }
             Block::Other => continue,
         };
         if let Some((name, rest)) = line.option() {

@@ -1,11 +1,14 @@
 //! Databases of PHREEQC (Parkhurst and Appelo, U.S. Geological Survey Techniques and Methods 6-A43, 2013): dissolved species with constants,
 //! enthalpies, analytic expressions and activity coefficients, and solid phases.
 //!
+//! Numbers of Pitzer's law become `interaction` items.
+//!
 //! Each species that a reaction defines becomes an `equilibrium`, and a `species` where the library has none of its formula. Reactions with
 //! electrons are left out: each state of oxidation counts as an element of its own. So are gases, and what is bound to surfaces or
 //! exchangers.
 
 mod database;
+mod interactions;
 mod lines;
 mod names;
 mod write;

@@ -25,6 +25,7 @@ pub fn module(database: &Database, title: &str, wanted: &Wanted) -> Result<Impor
     let mut writer = Writer { library: Library::read(), ..Writer::default() };
     writer.dissolved(database, wanted);
     writer.solids(database, wanted);
+    writer.interactions(database, wanted);
     for (line, keyword) in &database.others {
         writer.leave_out(*line, keyword, "this kind of block is not imported");
     }
@@ -45,6 +46,7 @@ struct Writer {
     species: String,
     equilibria: String,
     solids: String,
+    interactions: String,
     /// Species of the library without numbers for their activity, which the database has.
     without_activity: Vec<String>,
     left_out: Vec<LeftOut>,
@@ -131,6 +133,40 @@ impl Writer {
             let head = format!("{}, line {} of the database", phase.name, phase.line);
             self.solids.push_str(&species(&head, &solid, text, volume, ""));
             self.solids.push_str(&item);
+        }
+    }
+
+    fn interactions(&mut self, database: &Database, wanted: &Wanted) {
+        for (line, name) in &database.interactions.unread {
+            self.leave_out(*line, name, "this option of the block PITZER is not imported");
+        }
+        for interaction in &database.interactions.found {
+            let unknown = interaction.species.iter().find(|s| !self.known.contains_key(*s));
+            if let Some(unknown) = unknown {
+                if wanted.elements.is_empty() {
+                    let name = interaction.species.join(" ");
+                    self.leave_out(interaction.line, &name, format!("`{unknown}` is not imported"));
+                }
+                continue;
+            }
+            let written: Vec<&str> = interaction.species.iter().map(|s| self.known[s].as_str()).collect();
+            let name: Vec<String> = interaction.species.iter().map(|s| names::word(s)).collect();
+            let terms = |terms: &[f64]| match terms {
+                [one] => number(*one),
+                many => format!("[{}]", many.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", ")),
+            };
+            let mut fields: Vec<String> =
+                interaction.numbers.iter().map(|(key, of)| format!("{key}: {}", terms(of))).collect();
+            if !interaction.reach.is_empty() {
+                fields.push(format!("reach: {}", terms(&interaction.reach)));
+            }
+            let _ = write!(
+                self.interactions,
+                "interaction between_{}: {} {{ {} }}\n",
+                name.join("_"),
+                written.join(" + "),
+                fields.join(", ")
+            );
         }
     }
 
@@ -227,9 +263,12 @@ impl Writer {
             out.push('\n');
         }
         out.push('\n');
-        for (head, part) in
-            [("dissolved species", &self.species), ("equilibria", &self.equilibria), ("solids", &self.solids)]
-        {
+        for (head, part) in [
+            ("dissolved species", &self.species),
+            ("equilibria", &self.equilibria),
+            ("solids", &self.solids),
+            ("interactions", &self.interactions),
+        ] {
             if !part.is_empty() {
                 let _ = write!(out, "// ---- {head}\n\n{part}");
             }

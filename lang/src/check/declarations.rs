@@ -117,6 +117,13 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
                 lab.check_circles(e);
             }
         }
+        ItemKind::Interaction { name, .. } => {
+            let interactions = &lab.tables.interactions;
+            let is_it = |k: &usize| interactions[*k].module == module && interactions[*k].span == name.span;
+            if let Some(k) = (0..interactions.len()).find(is_it) {
+                lab.check_interaction(k);
+            }
+        }
         ItemKind::Species { .. } => lab.check_species(id),
         ItemKind::Material { fields, .. } => material(lab, fields, module),
         ItemKind::Skill { sig, body, handlers, .. } => {

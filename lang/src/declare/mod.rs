@@ -3,6 +3,7 @@
 
 pub mod compatibility;
 pub mod equilibria;
+pub mod interactions;
 pub mod failures;
 pub mod fields;
 pub mod ids;

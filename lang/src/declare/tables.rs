@@ -113,6 +113,8 @@ pub struct Tables<'a> {
     pub reactions: Vec<ReactionDef<'a>>,
     /// Equilibria whose species are all known.
     pub equilibria: Vec<super::equilibria::EquilibriumDef<'a>>,
+    /// Interactions whose species are all known.
+    pub interactions: Vec<super::interactions::InteractionDef<'a>>,
     /// Reactive groups, materials and what must not meet.
     pub screen: Screen,
     /// Whether the check is of no use any more.
@@ -144,6 +146,7 @@ impl<'a> Tables<'a> {
             species: SpeciesTable::default(),
             reactions: Vec::new(),
             equilibria: Vec::new(),
+            interactions: Vec::new(),
             screen: Screen::default(),
             stop: Stop::default(),
             processes: Vec::new(),
@@ -166,6 +169,7 @@ impl<'a> Tables<'a> {
         tables.screen = compatibility(&tables, &mut diagnostics);
         tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
         tables.equilibria = super::equilibria::collect(names, &tables.species, &mut diagnostics);
+        tables.interactions = super::interactions::collect(names, &tables.species, &mut diagnostics);
         (tables, diagnostics)
     }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use matterix_ir::equilibrium::{
-    Circle, Equation, Layout, Member, Part, Phase, STANDARD, System, Unsettled, Written, rises, terms as terms_at,
+    Circle, Equation, Interactions, Layout, Member, Part, Phase, STANDARD, System, Unsettled, Written, rises, terms as terms_at,
 };
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
@@ -14,6 +14,7 @@ use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
 use crate::declare::equilibria::{ANALYTIC, CONSTANTS, POTENTIAL};
 use crate::declare::species::field;
 use crate::declare::{SpeciesId, Type};
+use crate::eval::interactions::Acting;
 use crate::eval::lab::{Elaborator, Mode};
 use crate::names::DeclId;
 use crate::units::Dimension;
@@ -139,8 +140,26 @@ impl<'a> Elaborator<'a> {
         if equilibria.is_empty() {
             return None;
         }
-        let system = self.system_of(&members, &equilibria)?;
+        let acting = match self.spread_of_interactions(id) {
+            Some(spread) => {
+                let charge = |s: &SpeciesId| self.tables.species.get(*s).formula.as_ref().map_or(0, |f| f.charge);
+                let acts = |s: &SpeciesId| {
+                    let mut interactions = self.tables.interactions.iter();
+                    interactions.any(|i| i.members.contains(s) && i.members.iter().all(|m| here.contains_key(m)))
+                };
+                let others = here.keys().filter(|s| charge(s) != 0 || acts(s));
+                let others: Vec<SpeciesId> = others.copied().filter(|s| !members.contains(s)).collect();
+                members.extend(others);
+                Some(self.acting(id, &members, spread)?)
+            }
+            None => None,
+        };
+        let system = self.system_of(&members, &equilibria, acting.as_ref().map(|acting| &acting.written))?;
         let args = self.numbers_of(id, &members, &equilibria, &system, (temperature, split))?;
+        let args = match acting {
+            Some(acting) => self.with_interactions(args, &acting, system.layout())?,
+            None => args.into(),
+        };
         Some(Speciation { system, members, equilibria, args })
     }
 
@@ -149,12 +168,23 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The system of some equilibria; made once for all mixtures that have the same.
-    fn system_of(&mut self, members: &[SpeciesId], equilibria: &[usize]) -> Option<Arc<System>> {
-        let key = (members.to_vec(), equilibria.to_vec());
+    fn system_of(
+        &mut self,
+        members: &[SpeciesId],
+        equilibria: &[usize],
+        acting: Option<&Interactions>,
+    ) -> Option<Arc<System>> {
+        let numbers = |all: &Interactions| {
+            let reach = all.each.iter().flat_map(|each| each.reach.map(f64::to_bits));
+            [all.spread.to_bits()].into_iter().chain(reach).collect()
+        };
+        let key = (members.to_vec(), equilibria.to_vec(), acting.map_or_else(Vec::new, numbers));
         if let Some(known) = self.systems.get(&key) {
             return known.clone();
         }
-        let made = System::try_from(self.written_system(members, equilibria)).ok().map(Arc::new);
+        let mut written = self.written_system(members, equilibria);
+        written.interactions = acting.cloned();
+        let made = System::try_from(written).ok().map(Arc::new);
         self.systems.insert(key, made.clone());
         made
     }
@@ -180,7 +210,7 @@ impl<'a> Elaborator<'a> {
         };
         let solvent_mass = members.first().map_or(0.0, |s| tables.species.get(*s).molar_mass);
         let (members, equations) = (members.iter().map(member).collect(), equilibria.iter().map(equation).collect());
-        Written { members, equations, solvent_mass }
+        Written { members, equations, solvent_mass, interactions: None }
     }
 
     fn numbers_of(
@@ -190,7 +220,7 @@ impl<'a> Elaborator<'a> {
         equilibria: &[usize],
         system: &System,
         (temperature, split): (Option<NodeId>, bool),
-    ) -> Option<Arc<[NodeId]>> {
+    ) -> Option<Vec<NodeId>> {
         let layout = system.layout();
         let around = self.surroundings(id)?;
         let none = self.graph.number(0.0);
@@ -227,6 +257,23 @@ impl<'a> Elaborator<'a> {
             None => {
                 (args[layout.heat()], args[layout.capacity()]) = (*heat, *capacity);
                 args[layout.reference()] = *reference;
+            }
+        }
+        Some(args)
+    }
+
+    /// Fills in the numbers of interactions.
+    fn with_interactions(
+        &mut self,
+        mut args: Vec<NodeId>,
+        acting: &Acting,
+        layout: Layout,
+    ) -> Option<Arc<[NodeId]>> {
+        let mut next = 0;
+        for interaction in &acting.which {
+            for terms in self.numbers_of_interaction(*interaction)? {
+                args[layout.interaction(next)..layout.interaction(next + 1)].copy_from_slice(&terms);
+                next += 1;
             }
         }
         Some(args.into())
@@ -301,7 +348,8 @@ impl<'a> Elaborator<'a> {
         Some(found)
     }
 
-    fn matter_option(&self, id: InstanceId, name: &str) -> Option<(&'a NamedExpr, crate::declare::MemberRef<'a>)> {
+    /// An option of the amount of matter of a mixture, and the member that declares it.
+    pub fn matter_option(&self, id: InstanceId, name: &str) -> Option<(&'a NamedExpr, crate::declare::MemberRef<'a>)> {
         let member = self.all_members(id).iter().copied().find(|m| self.is_matter(id, *m))?;
         let MemberKind::Value { options, .. } = &member.member.kind else { return None };
         Some((options.iter().find(|o| o.name.text == name)?, member))
@@ -639,7 +687,8 @@ impl Speciation {
     }
 }
 
-fn expr_of<'f>(fields: &'f [Field], key: &str) -> Option<&'f Expr> {
+/// The value of a field.
+pub fn expr_of<'f>(fields: &'f [Field], key: &str) -> Option<&'f Expr> {
     match &field(fields, key)?.value {
         FieldValue::Expr(e) => Some(e),
         _ => None,

@@ -9,6 +9,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::ItemKind;
+use crate::declare::interactions::InteractionDef;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
@@ -89,6 +90,8 @@ enum Bound {
     Ready,
     /// Whether an equilibrium of the file has two species on different sides, or on the same.
     Opposed(bool),
+    /// Whether an interaction of the file is between two species.
+    Interacts,
     /// The temperature at equilibrium.
     Settled,
     /// The ionic strength that equilibria leave.
@@ -110,6 +113,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("ready", Bound::Ready),
     ("opposed", Bound::Opposed(true)),
     ("alongside", Bound::Opposed(false)),
+    ("interacts", Bound::Interacts),
     ("settled_temperature", Bound::Settled),
     ("settled_strength", Bound::IonicStrength),
     ("equilibria_hold", Bound::EquilibriaHold),
@@ -305,6 +309,13 @@ impl Elaborator<'_> {
             (Bound::Opposed(apart), [Value::Species(a), Value::Species(b)]) => {
                 let holds = self.tables.equilibria.iter().any(|e| e.sides(*a, *b).is_some_and(|same| same != *apart));
                 self.certain(holds)
+            }
+            (Bound::Interacts, [Value::Species(a), Value::Species(b)]) => {
+                let is_between = |def: &InteractionDef<'_>| {
+                    def.members.len() == 2 && def.members.contains(a) && def.members.contains(b)
+                };
+                let acts = self.tables.interactions.iter().any(is_between);
+                self.certain(acts)
             }
             (Bound::Settled, [Value::Instance(m), Value::Num(otherwise)]) => {
                 let node = self.settled(*m, |_| Some(Part::Temperature)).unwrap_or(otherwise.node);

@@ -8,6 +8,7 @@ pub mod call;
 pub mod coerce;
 pub mod compare;
 pub mod equilibrium;
+pub mod interactions;
 pub mod expr;
 pub mod external;
 pub mod lab;

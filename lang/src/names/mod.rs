@@ -89,6 +89,7 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         | ItemKind::Solution { name, .. }
         | ItemKind::Reaction { name, .. }
         | ItemKind::Equilibrium { name, .. }
+        | ItemKind::Interaction { name, .. }
         | ItemKind::ReactiveGroup { name, .. }
         | ItemKind::Material { name, .. }
         | ItemKind::Hazard { name, .. }

@@ -117,6 +117,15 @@ pub enum ItemKind {
         /// Rate, order, window, template, enthalpy.
         fields: Vec<Field>,
     },
+    /// `interaction i: Na+ + Cl- { b0: 0.0765 }`.
+    Interaction {
+        /// Its name.
+        name: Name,
+        /// What acts on each other.
+        between: Vec<Term>,
+        /// Its numbers.
+        fields: Vec<Field>,
+    },
     /// `equilibrium e: HA <-> H+ + A- { pka: 4.756 }`.
     Equilibrium {
         /// Its name.

@@ -392,6 +392,7 @@ const BLOCK_WORDS: &[&str] = &[
     "solution",
     "reaction",
     "equilibrium",
+    "interaction",
     "reactive_group",
     "material",
     "incompatible",

@@ -109,6 +109,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_solution
             | kw_reaction
             | kw_equilibrium
+            | kw_interaction
             | kw_reactive_group
             | kw_material
             | kw_incompatible

@@ -9,6 +9,7 @@ pub(super) const ITEM_WORDS: &[&str] = &[
     "solution",
     "reaction",
     "equilibrium",
+    "interaction",
     "reactive_group",
     "material",
     "incompatible",

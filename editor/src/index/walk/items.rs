@@ -66,6 +66,10 @@ impl Walk<'_> {
                     self.exprs(&label.tolerance);
                 }
             }
+            ItemKind::Interaction { between, fields, .. } => {
+                self.terms(between);
+                self.reaction_fields(fields);
+            }
             ItemKind::Reaction { reactants, products, fields, .. }
             | ItemKind::Equilibrium { reactants, products, fields, .. } => {
                 self.terms(reactants);

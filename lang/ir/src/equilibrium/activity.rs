@@ -1,7 +1,11 @@
 //! Activity coefficients of what is dissolved, by ionic strength and temperature.
 
 use super::Layout;
+use super::pitzer::At;
 use super::solve::{LN_10, STANDARD};
+
+/// An ionic strength below this, mol/kg, changes nothing.
+const LEAST: f64 = 1e-16;
 
 /// What all coefficients of a mixture follow: `A = a0 + a1 t + a2 t^2` and `B = b0 + b1 t` with `t = T - 298.15 K`. Above an ionic
 /// strength of `most`, in mol/kg, coefficients are those at `most`. Each mol/kg of what is dissolved lowers the logarithm of the activity
@@ -65,7 +69,14 @@ pub(super) struct Around {
     a: f64,
     b: f64,
     /// How A and B grow with temperature.
-    rises: [f64; 2],
+    pub(super) rises: [f64; 2],
+}
+
+impl Around {
+    /// Where interactions are: molalities are still to be said.
+    pub(super) fn at(&self) -> At<'static> {
+        At { a: self.a, strength: self.strength.max(LEAST), molalities: &[] }
+    }
 }
 
 impl Coefficients {

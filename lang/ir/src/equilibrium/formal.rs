@@ -42,6 +42,8 @@ impl Rest {
         let mut rest = written.clone();
         rest.members.remove(member);
         rest.equations.iter_mut().for_each(|e| _ = e.coefficients.remove(member));
+        let acting = rest.interactions.iter_mut().flat_map(|all| &mut all.each).flat_map(|e| &mut e.members);
+        acting.for_each(|i| *i -= usize::from(*i > member));
         let system = Arc::new(System::try_from(rest).ok()?);
         Some(Rest { member, system })
     }

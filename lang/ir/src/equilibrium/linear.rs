@@ -30,7 +30,7 @@ impl Matrix {
         &mut self.entries[row * self.size..(row + 1) * self.size]
     }
 
-    fn row(&self, row: usize) -> &[f64] {
+    pub(super) fn row(&self, row: usize) -> &[f64] {
         &self.entries[row * self.size..(row + 1) * self.size]
     }
 }

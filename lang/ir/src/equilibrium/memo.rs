@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::basis::Basis;
 use super::slopes::Slopes;
 use super::solve::{self, Solution};
-use super::{System, Written};
+use super::{Interaction, System, Written};
 
 /// So many solutions are kept. Which ones changes no result.
 const KEPT: usize = 256;
@@ -46,7 +46,13 @@ pub(super) fn fingerprint(written: &Written) -> u64 {
         .equations
         .iter()
         .flat_map(|e| [text(&e.name)].into_iter().chain(e.coefficients.iter().map(|c| c.to_bits())));
-    mixed(written.solvent_mass.to_bits(), members.chain(equations))
+    let interactions = written.interactions.iter().flat_map(|all| {
+        let of = |i: &Interaction| {
+            i.members.iter().map(|m| *m as u64).chain(i.reach.iter().map(|r| r.to_bits())).collect::<Vec<u64>>()
+        };
+        [all.spread.to_bits()].into_iter().chain(all.each.iter().flat_map(of))
+    });
+    mixed(written.solvent_mass.to_bits(), members.chain(equations).chain(interactions))
 }
 
 /// The basis of a system where some solids are there; none where these can become each other.

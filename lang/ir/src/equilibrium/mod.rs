@@ -15,7 +15,9 @@ mod bounds;
 mod formal;
 mod linear;
 mod memo;
+mod mixing;
 mod newton;
+mod pitzer;
 mod problem;
 #[cfg(test)]
 mod sketch;
@@ -32,6 +34,8 @@ use serde::{Deserialize, Serialize};
 pub use activity::{Activities, Coefficients};
 use basis::Basis;
 pub use basis::{Circle, Unsettled};
+use pitzer::Virial;
+pub use pitzer::{Interaction, Interactions};
 use solve::Solution;
 pub use solve::{STANDARD, rises, terms};
 
@@ -77,6 +81,8 @@ pub struct Written {
     pub equations: Vec<Equation>,
     /// Molar mass of the solvent, kg/mol.
     pub solvent_mass: f64,
+    /// The law of Pitzer in place of that of [`Coefficients`]; none where these hold.
+    pub interactions: Option<Interactions>,
 }
 
 /// Equations between members, ready to be solved.
@@ -85,6 +91,7 @@ pub struct Written {
 pub struct System {
     written: Written,
     basis: Arc<Basis>,
+    virial: Option<Arc<Virial>>,
     rest: Option<formal::Rest>,
     fingerprint: u64,
 }
@@ -102,7 +109,8 @@ impl TryFrom<Written> for System {
         let basis = Arc::new(Basis::new(&written)?);
         let fingerprint = memo::fingerprint(&written);
         let rest = formal::Rest::of(&written);
-        Ok(System { written, basis, rest, fingerprint })
+        let virial = Virial::of(&written).map(Arc::new);
+        Ok(System { written, basis, virial, rest, fingerprint })
     }
 }
 
@@ -129,15 +137,18 @@ pub enum Part {
     Capacity,
 }
 
-/// Arguments of a system, in their order: what is the same for all, then what is of an equation, then what is of a member, then the heat.
+/// Arguments of a system, in their order: what is the same for all, then what is of an equation, of an interaction, of a member, then the
+/// heat.
 ///
-/// The constant of an equation follows from six terms, with the temperature T in K:
+/// The constant of an equation follows from six terms, as a number of an interaction does, with the temperature T in K:
 /// `ln K = k0 + k1 / T + k2 ln T + k3 T + k4 / T^2 + k5 T^2`. The equation of energy is
 /// `heat = heat of formation + capacity * (T - reference)`; where `capacity` has no end, the temperature is `reference`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     members: usize,
     equations: usize,
+    /// Numbers of [`Interactions`].
+    interactions: usize,
 }
 
 impl Layout {
@@ -165,9 +176,14 @@ impl Layout {
         self.constant(self.equations) + equation
     }
 
+    /// The terms of a number of [`Interactions`] begin here: all numbers of the first one, then those of the next.
+    pub fn interaction(self, number: usize) -> usize {
+        self.enthalpy(self.equations) + Self::TERMS * number
+    }
+
     /// The numbers of [`Coefficients`] of a member begin here.
     pub fn coefficients(self, member: usize) -> usize {
-        self.enthalpy(self.equations) + Self::COEFFICIENTS * member
+        self.interaction(self.interactions) + Self::COEFFICIENTS * member
     }
 
     /// Heat capacity of a member, J/(mol*K).
@@ -213,8 +229,11 @@ impl Layout {
         } else if arg < self.enthalpy(0) {
             let (equation, term) = within(self.constant(0), Self::TERMS);
             Role::Constant(equation, term)
-        } else if arg < self.coefficients(0) {
+        } else if arg < self.interaction(0) {
             Role::Enthalpy(arg - self.enthalpy(0))
+        } else if arg < self.coefficients(0) {
+            let (number, term) = within(self.interaction(0), Self::TERMS);
+            Role::Interaction(number, term)
         } else if arg < self.capacity_of(0) {
             let (member, number) = within(self.coefficients(0), Self::COEFFICIENTS);
             Role::Coefficient(member, number)
@@ -235,6 +254,7 @@ enum Role {
     Activities(usize),
     Constant(usize, usize),
     Enthalpy(usize),
+    Interaction(usize, usize),
     Coefficient(usize, usize),
     CapacityOf(usize),
     Amount(usize),
@@ -258,7 +278,8 @@ impl System {
 
     /// Where each argument stands.
     pub fn layout(&self) -> Layout {
-        Layout { members: self.written.members.len(), equations: self.written.equations.len() }
+        let interactions = self.virial.as_ref().map_or(0, |virial| virial.count());
+        Layout { members: self.written.members.len(), equations: self.written.equations.len(), interactions }
     }
 
     /// Equations that follow from others, by what each is made of: their constants must agree.

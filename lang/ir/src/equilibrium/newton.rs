@@ -110,9 +110,9 @@ impl Problem<'_> {
             if let Some((sums, temperature)) = follows {
                 // What swings is held the more firmly the longer it does.
                 let share = 0.9 / (1.0 + count as f64 / 20.0);
-                for (place, sum) in sums {
-                    let shifted = x[place] + NO_IONS;
-                    x[place] = shifted * math::pow((sum + NO_IONS) / shifted, share) - NO_IONS;
+                for (x, sum) in x[places.sums()].iter_mut().zip(sums) {
+                    let shifted = *x + NO_IONS;
+                    *x = shifted * math::pow((sum + NO_IONS) / shifted, share) - NO_IONS;
                 }
                 let known = &mut x[places.temperature()];
                 let limits = (TEMPERATURES.0.max(*known - WARMEST_STEP), TEMPERATURES.1.min(*known + WARMEST_STEP));
@@ -184,10 +184,9 @@ impl Problem<'_> {
         let longest = step[..=places.solvent()].iter().fold(0.0_f64, |most, s| most.max(s.abs()));
         let warmest = step.get(places.temperature()).map_or(0.0, |by| by.abs());
         let share = 1.0_f64.min(most / longest).min(WARMEST_STEP / warmest);
-        let sums = [places.strength(), places.molality()];
-        let before = sums.map(|place| x[place]);
+        let before = x[places.sums()].to_vec();
         x.iter_mut().zip(step).for_each(|(x, step)| *x += share * step);
-        sums.iter().zip(before).for_each(|(place, before)| x[*place] = x[*place].max(0.1 * before));
+        x[places.sums()].iter_mut().zip(before).for_each(|(x, before)| *x = x.max(0.1 * before));
         let temperature = &mut x[places.temperature()];
         *temperature = temperature.clamp(TEMPERATURES.0, TEMPERATURES.1);
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::activity::{Activities, Coefficients};
 use super::basis::Basis;
 use super::linear::{Factors, Matrix};
+use super::state::NO_IONS;
 use super::{Layout, System};
 use crate::math;
 
@@ -38,6 +39,8 @@ impl Totals {
 #[derive(Clone, Copy)]
 pub(super) struct Places {
     pub(super) masters: usize,
+    /// Molalities that are unknowns of their own.
+    pub(super) placed: usize,
 }
 
 impl Places {
@@ -53,12 +56,21 @@ impl Places {
         self.masters + 2
     }
 
+    pub(super) fn placed(self) -> std::ops::Range<usize> {
+        self.masters + 3..self.temperature()
+    }
+
+    /// All that are made by summing up amounts: ionic strength and molalities.
+    pub(super) fn sums(self) -> std::ops::Range<usize> {
+        self.strength()..self.temperature()
+    }
+
     pub(super) fn temperature(self) -> usize {
-        self.masters + 3
+        self.masters + 3 + self.placed
     }
 
     pub(super) fn count(self) -> usize {
-        self.masters + 4
+        self.temperature() + 1
     }
 }
 
@@ -80,7 +92,12 @@ impl<'a> Problem<'a> {
     }
 
     pub(super) fn places(&self) -> Places {
-        Places { masters: self.basis.masters.len() }
+        Places { masters: self.basis.masters.len(), placed: self.placed().len() }
+    }
+
+    /// Members whose molalities are unknowns.
+    pub(super) fn placed(&self) -> &'a [usize] {
+        self.system.virial.as_ref().map_or(&[], |virial| &virial.placed)
     }
 
     pub(super) fn given(&self, member: usize) -> f64 {
@@ -191,7 +208,9 @@ impl<'a> Problem<'a> {
         let solutes: f64 = self.basis.solutes.iter().map(|i| self.given(*i).max(0.0)).sum();
         let molality = (solutes + self.args[self.layout.bystander_amount()]) / solvent + 1e-7;
         let mut x: Vec<f64> = (0..self.basis.masters.len()).map(free).collect();
-        x.extend([math::ln(solvent), strength, molality, temperature]);
+        x.extend([math::ln(solvent), strength, molality]);
+        x.extend(self.placed().iter().map(|i| self.given(*i).max(0.0) / solvent + NO_IONS));
+        x.push(temperature);
         x
     }
 

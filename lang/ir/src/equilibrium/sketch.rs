@@ -20,7 +20,8 @@ impl Sketch {
     /// Water alone.
     pub fn new() -> Sketch {
         let water = Member { name: "water".into(), phase: Phase::Solvent, charge: 0.0 };
-        let written = Written { members: vec![water], equations: Vec::new(), solvent_mass: 0.018_015 };
+        let written =
+            Written { members: vec![water], equations: Vec::new(), solvent_mass: 0.018_015, interactions: None };
         Sketch { written, constants: Vec::new() }
     }
 

@@ -2,9 +2,10 @@
 
 use super::basis::Basis;
 use super::linear::Factors;
+use super::pitzer::{At, Turn, Virial};
 use super::problem::Problem;
 use super::solve::{Point, STANDARD, Solution, terms};
-use super::{Member, Part, Phase, Role, System};
+use super::{Part, Phase, Role, System};
 
 /// The number of the activity of the solvent among [`super::Activities`].
 const LOWERING: usize = super::Layout::ACTIVITIES - 1;
@@ -23,8 +24,10 @@ pub(super) struct Slopes {
 struct Direction {
     /// The unknowns.
     step: Vec<f64>,
-    /// The logarithms of dissolved members beside that, and of constants of solids.
+    /// The logarithms of amounts of dissolved members beside that.
     grown: Vec<f64>,
+    /// Those of activities, and of constants of solids.
+    raised: Vec<f64>,
 }
 
 impl Slopes {
@@ -57,45 +60,57 @@ fn as_given(problem: &Problem<'_>, part: Part, arg: usize) -> f64 {
 }
 
 fn direction(problem: &Problem<'_>, point: &Point, factors: &Factors, arg: usize) -> Direction {
-    let grown = grown(problem, point, arg);
+    let (grown, raised) = beside(problem, point, arg);
     let mut right = problem.moved(&grown, &point.state);
     aside(problem, point, arg, &mut right);
     right.iter_mut().for_each(|v| *v = -*v);
-    Direction { step: factors.solve(right), grown }
+    Direction { step: factors.solve(right), grown, raised }
 }
 
-/// How the logarithm of each dissolved member, and of the constant of each solid, grows with an argument while the unknowns stay.
-fn grown(problem: &Problem<'_>, point: &Point, arg: usize) -> Vec<f64> {
+/// How the logarithm of the amount of each dissolved member, and that of the activity of each, or of the constant of a solid, grow with an
+/// argument while the unknowns stay.
+fn beside(problem: &Problem<'_>, point: &Point, arg: usize) -> (Vec<f64>, Vec<f64>) {
     let (basis, places) = (&problem.basis, problem.places());
     let temperature = point.x[places.temperature()];
     let around = problem.activities.around(point.x[places.strength()], temperature);
     let count = basis.of.len();
-    match problem.layout.role(arg) {
-        Role::Activities(LOWERING) => {
-            let molality = point.x[places.molality()];
-            (0..count).map(|i| -basis.solvent[i] * molality).collect()
+    let same = |raised: Vec<f64>| (raised.clone(), raised);
+    let less = |coefficient: &dyn Fn(usize) -> f64| ((0..count).map(|i| -coefficient(i)).collect(), vec![0.0; count]);
+    let is_solute = |i: usize| problem.system.members()[i].phase == Phase::Solute;
+    let by_turn = |virial: &Virial, turn: Turn| {
+        let raised: Vec<f64> = (0..count).map(|i| problem.dryness(i) * turn.osmotic).collect();
+        let of = |i: usize| virial.place(i).map_or(0.0, |k| turn.ln[k]);
+        ((0..count).map(|i| raised[i] - of(i)).collect(), raised)
+    };
+    let at = At { molalities: &point.x[places.placed()], ..around.at() };
+    match (problem.layout.role(arg), problem.system.virial.as_deref()) {
+        (Role::Activities(LOWERING), _) => {
+            let molality = point.x[places.molality()] + point.state.effects.osmotic;
+            same((0..count).map(|i| -basis.solvent[i] * molality).collect())
         }
-        Role::Activities(which) => (0..count)
-            .map(|i| match problem.system.members()[i] {
-                Member { phase: Phase::Solute, charge, .. } => {
-                    -problem.coefficients(i).by_common(&around, charge, temperature - STANDARD, which)
-                }
-                _ => 0.0,
-            })
-            .collect(),
-        Role::Coefficient(member, which) => {
-            let Member { phase, charge, .. } = problem.system.members()[member];
-            let mut grown = vec![0.0; count];
-            if phase == Phase::Solute {
-                grown[member] = -problem.coefficients(member).by_own(&around, charge, which);
+        (Role::Activities(which @ 0..3), Some(virial)) => {
+            let by = (temperature - STANDARD).powi(which as i32);
+            by_turn(virial, virial.turn(at, &vec![0.0; virial.count()], by))
+        }
+        (Role::Interaction(number, term), Some(virial)) => {
+            by_turn(virial, virial.turn_by(at, number, terms(temperature)[term]))
+        }
+        (Role::Activities(which), None) => less(&|i| match is_solute(i) {
+            true => {
+                let charge = problem.system.members()[i].charge;
+                problem.coefficients(i).by_common(&around, charge, temperature - STANDARD, which)
             }
-            grown
-        }
-        Role::Constant(r, term) => {
+            false => 0.0,
+        }),
+        (Role::Coefficient(member, which), None) if is_solute(member) => less(&|i| {
+            let charge = problem.system.members()[i].charge;
+            if i == member { problem.coefficients(i).by_own(&around, charge, which) } else { 0.0 }
+        }),
+        (Role::Constant(r, term), _) => {
             let by = terms(temperature)[term];
-            (0..count).map(|i| by * by_equation(basis, i, r)).collect()
+            same((0..count).map(|i| by * by_equation(basis, i, r)).collect())
         }
-        _ => vec![0.0; count],
+        _ => same(vec![0.0; count]),
     }
 }
 
@@ -154,7 +169,7 @@ fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
             let all = 0..basis.of.len();
             rows[warmth] -= all.map(|i| by_equation(basis, i, r) * formed(i)).sum::<f64>() / scale;
         }
-        Role::Activities(_) | Role::Constant(..) | Role::Coefficient(..) => {}
+        Role::Activities(_) | Role::Constant(..) | Role::Coefficient(..) | Role::Interaction(..) => {}
     }
 }
 
@@ -183,11 +198,10 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
         Part::Activity(i) => {
             let i = i as usize;
             let formed: f64 = problem.masters_of(i).iter().map(|(c, of)| of * direction.step[*c]).sum();
-            // What makes activities of amounts moves the amount, not the activity.
-            let moves_amounts = matches!(role, Role::Activities(0..LOWERING) | Role::Coefficient(..));
-            let constant = if moves_amounts { 0.0 } else { direction.grown[i] };
-            let rise = point.state.rises[i] * direction.step[places.temperature()];
-            formed + constant + rise + problem.dryness(i) * direction.step[places.molality()]
+            let mut others = vec![0.0; places.count() - places.masters];
+            problem.activity_by(i, &point.state, &mut others);
+            let behind = &direction.step[places.masters..];
+            formed + direction.raised[i] + others.iter().zip(behind).map(|(by, step)| by * step).sum::<f64>()
         }
         Part::Temperature => direction.step[places.temperature()],
         Part::Strength => direction.step[places.strength()],

@@ -1,9 +1,10 @@
 //! What follows from the unknowns: constants, amounts, and how far each condition is from being met.
 
-use super::activity::Coefficient;
+use super::activity::{Around, Coefficient};
 use super::linear::Matrix;
+use super::pitzer::{At, Effects, Turn, Virial};
 use super::problem::{Problem, Totals};
-use super::{Phase, rises, terms};
+use super::{Layout, Phase, rises, terms};
 use crate::math;
 
 /// Ions per mass of solvent that do not matter, mol/kg.
@@ -22,6 +23,12 @@ pub(super) struct State {
     pub(super) capacities: Vec<f64>,
     /// By member.
     pub(super) coefficients: Vec<Coefficient>,
+    /// Numbers of interactions, and how much they grow with temperature.
+    pub(super) numbers: Vec<f64>,
+    number_rises: Vec<f64>,
+    /// What interactions make of coefficients and of the activity of the solvent, and how that grows with temperature.
+    pub(super) effects: Effects,
+    pub(super) warming: Turn,
     /// By member: mol.
     pub(super) amounts: Vec<f64>,
     /// By row: what adds to a total, and what it should be; and 1 over each.
@@ -39,6 +46,8 @@ pub(super) struct State {
     /// How much the conditions of both grow with each mol of them.
     pub(super) by_charges: f64,
     pub(super) by_dissolved: f64,
+    /// The same of each placed member.
+    by_placed: Vec<f64>,
     /// How far each condition is from being met.
     pub(super) residuals: Vec<f64>,
 }
@@ -57,10 +66,17 @@ impl Problem<'_> {
         state.coefficients.resize(count, Coefficient::default());
         state.amounts.clear();
         state.amounts.resize(count, 0.0);
+        let virial = self.system.virial.as_deref();
+        if let Some(virial) = virial {
+            self.interact(virial, &around, x, state);
+        }
         let (mut charges, mut dissolved) = (0.0, 0.0);
         for &i in &basis.solutes {
             let charge = basis.charges[i];
-            let coefficient = self.coefficients(i).coefficient(&around, charge);
+            let coefficient = match virial {
+                Some(virial) => virial.place(i).map_or_else(Coefficient::default, |k| state.interacting(k)),
+                None => self.coefficients(i).coefficient(&around, charge),
+            };
             let amount = math::exp(self.activity(i, state, x) - coefficient.ln + x[places.solvent()]);
             state.coefficients[i] = coefficient;
             state.amounts[i] = amount;
@@ -71,18 +87,29 @@ impl Problem<'_> {
         state.dissolved = dissolved + self.args[self.layout.bystander_amount()];
         state.amounts[basis.water] = math::exp(x[places.solvent()]) / self.system.written.solvent_mass;
         [state.by_charges, state.by_dissolved] = [state.charges, state.dissolved].map(|sum| self.by_amount(sum, state));
+        state.by_placed.clear();
+        for i in self.placed() {
+            state.by_placed.push(self.by_amount(state.amounts[*i], state));
+        }
         self.balances(state, totals);
         self.energy(state, temperature);
-        for (place, sum) in self.sums(state) {
-            let per_mass = self.per_mass(sum, state);
+        for place in places.sums() {
+            let per_mass = self.per_mass(self.sum(place, state), state);
             state.residuals.push((x[place] - per_mass) / (per_mass + NO_IONS));
         }
         state.residuals.push(self.energy_residual(state));
     }
 
+    /// What interactions make of coefficients.
+    fn interact(&self, virial: &Virial, around: &Around, x: &[f64], state: &mut State) {
+        let at = At { molalities: &x[self.places().placed()], ..around.at() };
+        virial.effects(at, &state.numbers, &mut state.effects);
+        state.warming = virial.turn(at, &state.number_rises, around.rises[0]);
+    }
+
     /// The logarithm of the activity of a dissolved member; how far a solid is above its constant.
     pub(super) fn activity(&self, member: usize, state: &State, x: &[f64]) -> f64 {
-        let solvent = self.dryness(member) * x[self.places().molality()];
+        let solvent = self.dryness(member) * (x[self.places().molality()] + state.effects.osmotic);
         state.constants[member] + self.masters_of(member).iter().map(|(c, of)| of * x[*c]).sum::<f64>() + solvent
     }
 
@@ -107,6 +134,13 @@ impl Problem<'_> {
             to.clear();
             to.extend(basis.by.iter().map(|by| sum(by, which)));
         };
+        let numbers = |by: &[f64], to: &mut Vec<f64>| {
+            let of = &self.args[layout.interaction(0)..layout.coefficients(0)];
+            to.clear();
+            to.extend(of.chunks(Layout::TERMS).map(|of| of.iter().zip(by).map(|(of, by)| of * by).sum::<f64>()));
+        };
+        numbers(&terms, &mut state.numbers);
+        numbers(&rises, &mut state.number_rises);
         all(0, &mut state.constants);
         if let Some(k) = basis.held.iter().position(|i| basis.formal.contains(i)) {
             state.constants.iter_mut().zip(&basis.of_held).for_each(|(constant, of)| *constant += of[k] * self.limit);
@@ -162,10 +196,10 @@ impl Problem<'_> {
     pub(super) fn jacobian(&self, state: &State, free: usize, matrix: &mut Matrix) {
         let (basis, places) = (&*self.basis, self.places());
         matrix.clear(free);
+        let mut others = vec![0.0; places.count() - places.masters];
         for &i in &basis.solutes {
-            let (amount, coefficient, parts) = (state.amounts[i], &state.coefficients[i], basis.masters_of.row(i));
-            let warmth = state.rises[i] - coefficient.by_warmth;
-            let others = [1.0, -coefficient.by_strength, self.dryness(i), warmth];
+            let (amount, parts) = (state.amounts[i], basis.masters_of.row(i));
+            self.amount_by(i, state, &mut others);
             let add = |row: &mut [f64], share: f64| {
                 parts.iter().for_each(|(column, of)| row[*column] += share * of);
                 // Those that are not free are cut off.
@@ -175,8 +209,8 @@ impl Problem<'_> {
         }
         let amount = state.amounts[basis.water];
         self.each_row(basis.water, state, free, |row, share| *matrix.at(row, places.solvent()) += share * amount);
-        for (row, sum) in self.sums(state).into_iter().filter(|(row, _)| *row < free) {
-            let per_mass = self.per_mass(sum, state);
+        for row in places.sums().filter(|row| *row < free) {
+            let per_mass = self.per_mass(self.sum(row, state), state);
             *matrix.at(row, row) += 1.0 / (per_mass + NO_IONS);
             *matrix.at(row, places.solvent()) += per_mass / (per_mass + NO_IONS);
         }
@@ -186,9 +220,34 @@ impl Problem<'_> {
         }
     }
 
-    /// What the ionic strength and the molality of all are made of, by their unknowns: mol.
-    pub(super) fn sums(&self, state: &State) -> [(usize, f64); 2] {
-        [(self.places().strength(), state.charges), (self.places().molality(), state.dissolved)]
+    /// How the logarithm of the activity of a member moves with the unknowns behind the masters.
+    pub(super) fn activity_by(&self, member: usize, state: &State, to: &mut [f64]) {
+        let (dryness, effects) = (self.dryness(member), &state.effects);
+        let last = to.len() - 1;
+        to[..3].copy_from_slice(&[0.0, dryness * effects.osmotic_by_strength, dryness]);
+        to[3..last].iter_mut().zip(&effects.osmotic_by).for_each(|(to, by)| *to = dryness * by);
+        to[last] = state.rises[member] + dryness * state.warming.osmotic;
+    }
+
+    /// How the logarithm of the amount of a dissolved member moves with them.
+    fn amount_by(&self, member: usize, state: &State, to: &mut [f64]) {
+        self.activity_by(member, state, to);
+        let (coefficient, last) = (&state.coefficients[member], to.len() - 1);
+        to[0] += 1.0;
+        to[1] -= coefficient.by_strength;
+        if let Some(k) = self.system.virial.as_ref().and_then(|virial| virial.place(member)) {
+            to[3..last].iter_mut().zip(state.effects.by.row(k)).for_each(|(to, by)| *to -= by);
+        }
+        to[last] -= coefficient.by_warmth;
+    }
+
+    /// What an unknown is made of that sums amounts up: mol.
+    pub(super) fn sum(&self, place: usize, state: &State) -> f64 {
+        match place - self.places().strength() {
+            0 => state.charges,
+            1 => state.dissolved,
+            k => state.amounts[self.placed()[k - 2]],
+        }
     }
 
     /// So much per mass of solvent, mol/kg.
@@ -213,6 +272,9 @@ impl Problem<'_> {
                 visit(places.strength(), -0.5 * charge * charge * state.by_charges);
             }
             visit(places.molality(), -state.by_dissolved);
+            if let Some(k) = self.system.virial.as_ref().and_then(|virial| virial.place(member)) {
+                visit(places.placed().start + k, -state.by_placed[k]);
+            }
         }
         if !self.is_isothermal() && places.temperature() < free {
             let heat = state.enthalpies[member] + state.capacities[member] * state.warmer;
@@ -229,11 +291,10 @@ impl Problem<'_> {
             Phase::Solid | Phase::Formal => 0.0,
             Phase::Solute => {
                 let formed: f64 = self.masters_of(member).iter().map(|(c, of)| of * step[*c]).sum();
-                let Coefficient { by_strength, by_warmth, .. } = state.coefficients[member];
-                let rise = state.rises[member] - by_warmth;
-                let by_solvent = self.dryness(member) * step[places.molality()];
-                let by_others = rise * step[places.temperature()] - by_strength * step[places.strength()] + by_solvent;
-                amount * (formed + step[places.solvent()] + by_others)
+                let mut others = vec![0.0; places.count() - places.masters];
+                self.amount_by(member, state, &mut others);
+                let others: f64 = others.iter().zip(&step[places.masters..]).map(|(by, step)| by * step).sum();
+                amount * (formed + others)
             }
         }
     }
@@ -251,10 +312,10 @@ impl Problem<'_> {
         rows
     }
 
-    /// The ionic strength, the molality of all and the temperature that amounts make.
-    pub(super) fn surroundings(&self, state: &State) -> ([(usize, f64); 2], f64) {
+    /// The ionic strength, the molalities and the temperature that amounts make.
+    pub(super) fn surroundings(&self, state: &State) -> (Vec<f64>, f64) {
         let warmer = if self.is_isothermal() { 0.0 } else { state.heated(self) };
-        let sums = self.sums(state).map(|(place, sum)| (place, self.per_mass(sum, state)));
+        let sums = self.places().sums().map(|place| self.per_mass(self.sum(place, state), state)).collect();
         (sums, self.reference() + warmer)
     }
 
@@ -271,6 +332,12 @@ impl Problem<'_> {
 }
 
 impl State {
+    /// The coefficient of a placed member.
+    fn interacting(&self, k: usize) -> Coefficient {
+        let Effects { ln, by_strength, .. } = &self.effects;
+        Coefficient { ln: ln[k], by_strength: by_strength[k], by_warmth: self.warming.ln[k] }
+    }
+
     /// How far above the reference temperature the heat that is there brings it.
     fn heated(&self, problem: &Problem<'_>) -> f64 {
         (problem.args[problem.layout.heat()] - self.heat) / self.capacity

@@ -52,7 +52,7 @@ pub use instances::Instance;
 pub use mode::Mode;
 
 /// Systems of equilibria by their species and equations.
-pub type Systems = BTreeMap<(Vec<SpeciesId>, Vec<usize>), Option<Arc<System>>>;
+pub type Systems = BTreeMap<(Vec<SpeciesId>, Vec<usize>, Vec<u64>), Option<Arc<System>>>;
 
 /// A member in one way of looking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

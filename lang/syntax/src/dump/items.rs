@@ -49,6 +49,9 @@ fn item_kind(kind: &ItemKind) -> Sexp {
         ItemKind::Reaction { name: word, reactants, reversible, products, fields: list } => node("reaction")
             .with([name(word), side(reactants), leaf(if *reversible { "<->" } else { "->" }), side(products)])
             .with(fields(list)),
+        ItemKind::Interaction { name: word, between, fields: list } => {
+            node("interaction").with([name(word), side(between)]).with(fields(list))
+        }
         ItemKind::Equilibrium { name: word, reactants, products, fields: list } => {
             node("equilibrium").with([name(word), side(reactants), leaf("<->"), side(products)]).with(fields(list))
         }

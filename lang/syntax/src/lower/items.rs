@@ -39,6 +39,11 @@ impl Lower<'_> {
                 products: self.side_in(kids),
                 fields: self.fields_in(kids),
             },
+            Rule::interaction => ItemKind::Interaction {
+                name: self.name_in(kids),
+                between: self.side_in(kids),
+                fields: self.fields_in(kids),
+            },
             Rule::equilibrium => {
                 let (name, reactants) = (self.name_in(kids), self.side_in(kids));
                 kids.has(Rule::biarrow);

@@ -84,7 +84,7 @@ pub(super) fn operator(spot: &Spot) -> Option<Mistake> {
         (":=", "="),
         ("++", "+= 1"),
     ];
-    if matches!(spot.form(), "reaction" | "equilibrium") {
+    if matches!(spot.form(), "reaction" | "equilibrium" | "interaction") {
         return None;
     }
     // The first sign of two may have been read as an operator of its own.

@@ -207,6 +207,7 @@ fn item() -> Text {
         }),
         (name(), quoted()).prop_map(|(n, t)| format!("allow {n} {t}")),
         (species(), quantity()).prop_map(|(s, q)| format!("solution S {{ {s}: {q}; water: rest }} labelled {q} of {s} +- 1 %")),
+        (species(), cond()).prop_map(|(s, c)| format!("interaction i: {s} + {s} {{ lambda: {c} }}")),
         (species(), cond()).prop_map(|(s, c)| format!("equilibrium e: {s} <-> 2 {s} {{ constant: {c}, at: 25 degC }}")),
         (species(), cond()).prop_map(|(s, c)| format!("reaction r: {s} + 2 {s} <-> {s} {{\n rate: {c},\n order: {{}}\n}}")),
         members,

@@ -1,3 +1,5 @@
+mod pitzer;
+
 use super::sketch::{LN_10, Sketch};
 use super::*;
 
