@@ -67,9 +67,7 @@ fn only_matter(tree: &File) -> Option<Vec<String>> {
         ItemKind::Species { name, .. }
         | ItemKind::Equilibrium { name, .. }
         | ItemKind::Interaction { name, .. }
-        | ItemKind::Const { name, .. } => {
-            Some(Some(name.text.clone()))
-        }
+        | ItemKind::Const { name, .. } => Some(Some(name.text.clone())),
         ItemKind::Hazard { .. } | ItemKind::Use { .. } => Some(None),
         _ => None,
     });

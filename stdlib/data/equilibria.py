@@ -2,7 +2,8 @@
 
     equilibria.py [--check] [--report]
 
-`species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source.
+`species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source;
+`interactions.csv` has a row for each number of an interaction, with its terms.
 `modules.csv` says which modules there are and what they use; `sources.csv` what each tag stands for; `modules/NAME.md` is the page of each
 module, `modules/NAME.more` what else stands in it. The sections of docs/library.md on them are written too. With `--check` nothing is
 written: the exit code is 1 where a module differs from its tables, where an equation does not balance or an equilibrium says what others say
@@ -205,6 +206,23 @@ def equilibrium(row):
     return doc + [head] + said + [f"    {constant}{sources}", f"    {window}", "}", ""]
 
 
+def interactions(rows):
+    lines, found = [], {}
+    for row in rows:
+        found.setdefault(row["between"], []).append(row)
+    for between, numbers in found.items():
+        species = between.split()
+        terms = {row["number"]: [number(x) for x in row["terms"].split()] for row in numbers}
+        said = [f"{key}: {of[0] if len(of) == 1 else '[' + ', '.join(of) + ']'}" for key, of in terms.items()]
+        sources = tag(*(row["source"] for row in numbers))
+        name = "between_" + "_".join(re.sub(r"(\^.*|(?<=[a-z])2?[+-]|(?<=[A-Z])[+-]|[+-])$", "", s) for s in species)
+        head = f"interaction {name}: {' + '.join(species)} {{"
+        doc = f"/// {', '.join(species[:-1])} and {species[-1]}."
+        line = f"{head} {', '.join(said)} }}{sources}"
+        lines += [doc, line, ""] if len(line) <= WIDTH else [doc, head, *(f"    {one}{sources}" for one in said), "}", ""]
+    return lines
+
+
 def sections(rows):
     found = {}
     for row in rows:
@@ -223,8 +241,9 @@ def wrapped(text, width=WIDTH - 4):
     return lines + [line]
 
 
-def module(entry, all_species, all_equilibria, sources):
+def module(entry, all_species, all_equilibria, all_interactions, sources):
     name = entry["module"]
+    acting = [row for row in all_interactions if row["module"] == name]
     own = [row for row in all_species if row["module"] == name]
     rules = [row for row in all_equilibria if row["module"] == name]
     body = []
@@ -234,6 +253,8 @@ def module(entry, all_species, all_equilibria, sources):
             body += species(row)
         for row in sections(rules).get(title, []):
             body += equilibrium(row)
+    if acting:
+        body += ["// ---- interactions", "", *interactions(acting)]
     used = [row for row in sources if f"[{row['tag']}]" in "\n".join(body)]
     head = ["mtx 1"]
     for paragraph in (HERE / "modules" / f"{name}.md").read_text(encoding="utf8").strip().split("\n\n"):
@@ -253,7 +274,7 @@ def listed(names):
     return "\n".join(wrapped(", ".join(f"`{name}`" for name in names)))
 
 
-def section(entry, all_species, all_equilibria):
+def section(entry, all_species, all_equilibria, all_interactions):
     """What docs/library.md says of a module."""
     name = entry["module"]
     own = [row for row in all_species if row["module"] == name]
@@ -267,6 +288,9 @@ def section(entry, all_species, all_equilibria):
         found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)", tail.read_text(encoding="utf8"), re.M)
         lines += ["| name | is |", "| --- | --- |"]
         lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}` | {doc} |" for doc, kind, word in found] + [""]
+    acting = [line.split()[1][:-1] for line in interactions([r for r in all_interactions if r["module"] == name]) if line.startswith("interaction")]
+    if acting:
+        lines += [f"Interactions ({len(acting)}):", "", listed(acting), ""]
     if name != "equilibria":
         return "\n".join(lines + ([f"Equilibria ({len(rules)}):", "", listed(row["name"] for row in rules), ""] if rules else []))
     lines += ["| equilibrium | constant at 25 °C | enthalpy, kJ/mol | source |", "| --- | --- | --- | --- |"]
@@ -277,10 +301,10 @@ def section(entry, all_species, all_equilibria):
     return "\n".join(lines + [""])
 
 
-def paged(page, entries, all_species, all_equilibria):
+def paged(page, entries, all_species, all_equilibria, all_interactions):
     """The page of the library with the sections of these modules."""
     for before, entry in zip([{"module": "framings"}, *entries], entries):
-        text = section(entry, all_species, all_equilibria)
+        text = section(entry, all_species, all_equilibria, all_interactions)
         old = re.search(rf"^## `std::{entry['module']}`\n.*?(?=^## )", page, re.M | re.S)
         if old:
             page = page[: old.start()] + text + "\n" + page[old.end():]
@@ -321,8 +345,11 @@ def faults(rows):
         off = {element: value for element, value in sums.items() if value}
         if off:
             found.append(f"{row['name']}: {row['equation']} is off by {off}")
-    if rank([sides(row["equation"]) for row in rows]) < len(rows):
-        found.append("an equilibrium follows from others")
+    # Salts of std::brines stand in other modules too, with constants for other activities; who uses both is told so.
+    for left_out in ({"brines"}, {"crystals", "solids"}):
+        some = [row for row in rows if row["module"] not in left_out]
+        if rank([sides(row["equation"]) for row in some]) < len(some):
+            found.append("an equilibrium follows from others")
     return found
 
 
@@ -344,10 +371,12 @@ def report(rows):
 
 
 def main():
-    modules, all_species, rows, sources = (table(f"{name}.csv") for name in ("modules", "species", "equilibria", "sources"))
+    modules, all_species, rows, acting, sources = (
+        table(f"{name}.csv") for name in ("modules", "species", "equilibria", "interactions", "sources")
+    )
     found = faults(rows)
     for entry in modules:
-        text = module(entry, all_species, rows, sources)
+        text = module(entry, all_species, rows, acting, sources)
         path = LIBRARY / f"{entry['module']}.mtx"
         if "--check" in sys.argv:
             if not path.exists() or path.read_text(encoding="utf8") != text:
@@ -356,7 +385,7 @@ def main():
             path.write_text(text, encoding="utf8")
     path = LIBRARY.parent / "docs" / "library.md"
     page = path.read_text(encoding="utf8")
-    text = paged(page, modules, all_species, rows)
+    text = paged(page, modules, all_species, rows, acting)
     if "--check" not in sys.argv:
         path.write_text(text, encoding="utf8")
     elif page != text:

@@ -29,6 +29,7 @@ mod gripping;
 mod harness;
 mod hidden;
 mod hollow;
+mod interactions;
 mod joints;
 mod laws;
 mod lsp;

@@ -1,10 +1,11 @@
 """Compares equilibria with PHREEQC on mixtures drawn by a seed: the same database, imported, and the same law of
 activity.
 
-    equilibria.py MATTERIXC FOLDER [CASES [SEED]]
+    equilibria.py MATTERIXC FOLDER [CASES [SEED]] [--pitzer]
 
 needs phreeqpython. Each case puts some salts, acids and bases into water at some temperature, sometimes with a solid that may form. Compared
 are the pH, every dissolved species above a trace, and which solids form. The exit code is 1 where one is further off than it may be.
+With `--pitzer` it is the database pitzer.dat, its law, and strong solutions.
 """
 
 import csv
@@ -26,6 +27,7 @@ REAGENTS = {
     "NaHCO3": {"Na+": 1, "HCO3-": 1}, "KH2PO4": {"K+": 1, "H2PO4-": 1}, "Na2HPO4": {"Na+": 2, "HPO4^2-": 1},
     "Na2SO4": {"Na+": 2, "SO4^2-": 1}, "MgSO4": {"Mg2+": 1, "SO4^2-": 1}, "NaF": {"Na+": 1, "F-": 1},
     "H3BO3": {"H3BO3(aq)": 1}, "ZnCl2": {"Zn2+": 1, "Cl-": 2}, "AlCl3": {"Al3+": 1, "Cl-": 3}, "BaCl2": {"Ba2+": 1, "Cl-": 2},
+    "NaBr": {"Na+": 1, "Br-": 1}, "K2SO4": {"K+": 2, "SO4^2-": 1}, "FeCl2": {"Fe2+": 1, "Cl-": 2},
     "SrCl2": {"Sr2+": 1, "Cl-": 2}, "LiBr": {"Li+": 1, "Br-": 1}, "CdCl2": {"Cd2+": 1, "Cl-": 2}, "PbCl2": {"Pb2+": 1, "Cl-": 2},
 }
 SOLIDS = {
@@ -33,20 +35,31 @@ SOLIDS = {
     "Witherite": ("Ba", "CO3"), "Celestite": ("Sr", "SO4"), "Gibbsite": ("Al", "OH"), "Anglesite": ("Pb", "SO4"), "Cerussite": ("Pb", "CO3"),
 }
 
-# A case counts up to this ionic strength, mol/kg: both laws are used within their range.
-STRONGEST = 0.5
+# The database, its law, what is put in, which solids may form, the largest amount as a power of ten, and the ionic strength up to which a
+# case counts, mol/kg: both laws are used within their range.
+DILUTE = ("phreeqc.dat", "debye_hueckel", sorted(REAGENTS.keys() - {"NaBr", "K2SO4", "FeCl2"}), SOLIDS, -1.2, 0.5)
+STRONG = (
+    "pitzer.dat", "pitzer",
+    ["HCl", "NaOH", "NaCl", "KCl", "CaCl2", "MgCl2", "Na2CO3", "NaHCO3", "Na2SO4", "MgSO4", "BaCl2", "LiBr", "NaBr", "K2SO4", "FeCl2"],
+    {
+        "Halite": ("Na", "Cl"), "Sylvite": ("K", "Cl"), "Mirabilite": ("Na", "SO4"), "Gypsum": ("Ca", "SO4"), "Calcite": ("Ca", "CO3"),
+        "Epsomite": ("Mg", "SO4"), "Arcanite": ("K", "SO4"), "Carnallite": ("K", "Mg"), "Barite": ("Ba", "SO4"), "Glaserite": ("K", "SO4"),
+    },
+    0.6, 12.0,
+)
+BASE, LAW, NAMES, FORMING, LARGEST, STRONGEST = STRONG if "--pitzer" in sys.argv else DILUTE
 # Species below this are not compared, mol/kg.
 TRACE = 1e-10
 PH, SHARE, INDEX = 0.01, 0.01, 0.01
 
 
 def draw(rng, reagents):
-    solids = rng.sample(sorted(SOLIDS), rng.randint(1, 2)) if rng.random() < 0.5 else []
+    solids = rng.sample(sorted(FORMING), rng.randint(1, 2)) if rng.random() < 0.5 else []
     # What solids are made of comes first.
-    parts = [part for solid in solids for part in SOLIDS[solid]]
+    parts = [part for solid in solids for part in FORMING[solid]]
     names = {rng.choice([name for name in reagents if part in name] or reagents) for part in parts}
     names |= set(rng.sample(reagents, rng.randint(1, 4)))
-    amounts = {name: float(f"{10 ** rng.uniform(-5, -1.2):.4g}") for name in sorted(names)}
+    amounts = {name: float(f"{10 ** rng.uniform(-5, LARGEST):.4g}") for name in sorted(names)}
     return amounts, solids, round(rng.uniform(5, 60), 1)
 
 
@@ -140,7 +153,7 @@ def text_of(case):
     return f"""mtx 1
 use {"_".join(["db"] + sorted(solids))}
 use std::glassware::Beaker250mL
-asset Cup: Beaker250mL {{ contents: {{ activities: debye_hueckel }} }}
+asset Cup: Beaker250mL {{ contents: {{ activities: {LAW} }} }}
 lab bench {{
     ambient: {temperature} degC
     cup = Cup at (0, 0, 0) m holding {holding} at {temperature} degC
@@ -166,19 +179,21 @@ def ours(program, folder, number, case):
 
 
 def main():
-    program, folder = str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(sys.argv[2])
-    count = int(sys.argv[3]) if len(sys.argv) > 3 else 200
-    rng = random.Random(int(sys.argv[4]) if len(sys.argv) > 4 else 1)
+    args = [arg for arg in sys.argv[1:] if not arg.startswith("--")]
+    program, folder = str(pathlib.Path(args[0]).resolve()), pathlib.Path(args[1])
+    count = int(args[2]) if len(args) > 2 else 200
+    rng = random.Random(int(args[3]) if len(args) > 3 else 1)
     folder.mkdir(parents=True, exist_ok=True)
-    data = pathlib.Path(phreeqpython.__file__).parent / "database" / "phreeqc.dat"
+    data = pathlib.Path(phreeqpython.__file__).parent / "database" / BASE
     library = pathlib.Path("stdlib/species.mtx").read_text()
-    database, changed = with_library(data.read_text(encoding="latin1"), library)
-    print(f"with the activity of a later database: {', '.join(changed)}")
-    (folder / "phreeqc.dat").write_text(database, encoding="latin1")
-    data = (folder / "phreeqc.dat").resolve()
-    engine = phreeqpython.PhreeqPython(database="phreeqc.dat", database_directory=folder.resolve())
-    reagents = sorted(REAGENTS)
-    cases = [draw(rng, reagents) for _ in range(count)]
+    database = data.read_text(encoding="latin1")
+    if BASE == "phreeqc.dat":
+        database, changed = with_library(database, library)
+        print(f"with the activity of a later database: {', '.join(changed)}")
+    (folder / BASE).write_text(database, encoding="latin1")
+    data = (folder / BASE).resolve()
+    engine = phreeqpython.PhreeqPython(database=BASE, database_directory=folder.resolve())
+    cases = [draw(rng, NAMES) for _ in range(count)]
     for number, case in enumerate(cases):
         home = folder / f"case{number}"
         home.mkdir(exist_ok=True)

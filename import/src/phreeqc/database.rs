@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::{Wanted, interactions};
 use super::lines::{Line, lines};
+use super::{Wanted, interactions};
 use crate::Mistake;
 
 /// Joules per calorie.

@@ -117,3 +117,24 @@ fn volumes_at_infinite_dilution_are_those_of_the_literature() {
     assert!((volume(&[4.465, 4.801, 4.325, -2.847, 1.748]) - 17.8).abs() < 0.6);
     assert!((volume(&[-0.3456, -7.252, 6.149, -2.479, 1.239]) + 17.9).abs() < 0.8);
 }
+
+#[test]
+fn numbers_of_pitzer_become_interactions() {
+    let text = "SOLUTION_SPECIES\nNa+ = Na+\nCl- = Cl-\nK+ = K+\nH2O = H2O\nPITZER\n-B0\n  Cl-  Na+  7.5e-2 9598.4 0 0 # a remark\n\
+                -C0\n  Na+ Cl- 1.48e-3\n-THETA\n  K+ Na+ -0.012\n-PSI\n  Cl- K+ Na+ -0.0015 0 0 1.8e-5\n-ALPHAS\n  Na+ Cl- 2 1\n\
+                -LAMBDA\n  Xx(aq) Na+ 0.1\n-ETA\n  Na+ Cl- 1\n";
+    let made = import(text, "x", &Wanted::default()).unwrap();
+    for line in [
+        "interaction between_Cl_Na: Cl- + Na+ { b0: [0.075, 9598.4], c0: 0.00148, reach: [2, 1] }",
+        "interaction between_K_Na: K+ + Na+ { theta: -0.012 }",
+        "interaction between_Cl_K_Na: Cl- + K+ + Na+ { psi: [-0.0015, 0, 0, 1.8e-5] }",
+    ] {
+        assert!(made.text.contains(line), "{}", made.text);
+    }
+    let left: Vec<&str> = made.left_out.iter().map(|left| left.name.as_str()).collect();
+    assert_eq!(left, ["Na+ Xx(aq)", "-ETA"]);
+    let wrong = |text: &str| import(text, "x", &Wanted::default()).unwrap_err();
+    assert_eq!(wrong("PITZER\n Na+ Cl- 1\n").line, 2);
+    assert_eq!(wrong("PITZER\n-B0\n Na+ Cl-\n").line, 3);
+    assert_eq!(wrong("PITZER\n-PSI\n Na+ Cl- x\n").line, 3);
+}

@@ -99,7 +99,11 @@ pub fn collect<'a>(
         if let Some((s, _)) = members.iter().find(|(s, n)| *n != 1.0 || !is_dissolved(*s)) {
             let headline = format!("`{}` is between what is dissolved", name.text);
             let label = format!("`{}` stands here as it is not dissolved", species.get(*s).name);
-            diagnostics.push(refused(headline, &label, "name two or three ions or dissolved molecules, without numbers before them"));
+            diagnostics.push(refused(
+                headline,
+                &label,
+                "name two or three ions or dissolved molecules, without numbers before them",
+            ));
             continue;
         }
         let charge = |s: &SpeciesId| species.get(*s).formula.as_ref().map_or(0, |f| f.charge);
@@ -128,7 +132,14 @@ pub fn collect<'a>(
         if diagnostics[before..].iter().any(Diagnostic::is_error) {
             continue;
         }
-        out.push(InteractionDef { name: name.text.clone(), module: decl.module, members, kind, fields, span: name.span });
+        out.push(InteractionDef {
+            name: name.text.clone(),
+            module: decl.module,
+            members,
+            kind,
+            fields,
+            span: name.span,
+        });
     }
     out
 }

@@ -3,10 +3,10 @@
 
 pub mod compatibility;
 pub mod equilibria;
-pub mod interactions;
 pub mod failures;
 pub mod fields;
 pub mod ids;
+pub mod interactions;
 pub mod kinds;
 pub mod properties;
 pub mod reactions;

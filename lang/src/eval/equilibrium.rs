@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use matterix_ir::equilibrium::{
-    Circle, Equation, Interactions, Layout, Member, Part, Phase, STANDARD, System, Unsettled, Written, rises, terms as terms_at,
+    Circle, Equation, Interactions, Layout, Member, Part, Phase, STANDARD, System, Unsettled, Written, rises,
+    terms as terms_at,
 };
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
@@ -263,12 +264,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Fills in the numbers of interactions.
-    fn with_interactions(
-        &mut self,
-        mut args: Vec<NodeId>,
-        acting: &Acting,
-        layout: Layout,
-    ) -> Option<Arc<[NodeId]>> {
+    fn with_interactions(&mut self, mut args: Vec<NodeId>, acting: &Acting, layout: Layout) -> Option<Arc<[NodeId]>> {
         let mut next = 0;
         for interaction in &acting.which {
             for terms in self.numbers_of_interaction(*interaction)? {

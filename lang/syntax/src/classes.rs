@@ -179,8 +179,8 @@ fn class(rule: Rule, parent: Rule, text: &str, called: bool) -> Option<Class> {
             Class::Declared(Declared::Member)
         }
         (
-            const_ | dimension | solution | reaction | equilibrium | interaction | reactive_group | material | framing | driver | lab
-            | study | fit,
+            const_ | dimension | solution | reaction | equilibrium | interaction | reactive_group | material | framing
+            | driver | lab | study | fit,
             ident,
         ) => Class::Declared(Declared::Other),
         (_, bare_word | returning) => Class::Call,

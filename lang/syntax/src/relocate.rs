@@ -142,7 +142,7 @@ impl Relocate for ItemKind {
                 each!(put: name reactants reversible products fields)
             }
             ItemKind::Interaction { name, between, fields } => each!(put: name between fields),
-        ItemKind::Equilibrium { name, reactants, products, fields } => each!(put: name reactants products fields),
+            ItemKind::Equilibrium { name, reactants, products, fields } => each!(put: name reactants products fields),
             ItemKind::ReactiveGroup { name, fields } => each!(put: name fields),
             ItemKind::Material { name, fields } => each!(put: name fields),
             ItemKind::Incompatible { a, b, fields } => each!(put: a b fields),
