@@ -1,4 +1,4 @@
-//! How soon an editor is answered: `cargo bench --bench editor`. A file of 1,000 lines in a package of 30; docs/performance.md says what is
+//! How soon an editor is answered: `cargo bench --bench editor`. A file of 1,000 lines in a package of 30; docs/notes/performance.md says what is
 //! meant by each line.
 
 #![allow(clippy::unwrap_used)]

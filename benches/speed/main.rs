@@ -1,4 +1,4 @@
-//! How long things take: `cargo bench --bench speed`. A table of medians; docs/performance.md says what is meant by each line.
+//! How long things take: `cargo bench --bench speed`. A table of medians; docs/notes/performance.md says what is meant by each line.
 //!
 //! The comparison with scipy needs a Python that has it, `python3` or the one `MATTERIX_PYTHON` names.
 
