@@ -24,6 +24,7 @@ mod files;
 mod findings;
 mod follows;
 mod formatting;
+mod gases;
 mod grids;
 mod gripping;
 mod harness;

@@ -7,7 +7,7 @@ use crate::ast::{ExprKind, NamedExpr, Role};
 use crate::declare::Type;
 use crate::declare::failures::BARS;
 use crate::declare::fields::word;
-use crate::declare::tables::{MATTER, is_true};
+use crate::declare::tables::{MATTER, OUTSIDE, is_true};
 use crate::elaborate::lab::SYMMETRIC;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::free::Bound;
@@ -20,7 +20,7 @@ use crate::near;
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
         Role::State => ("a state", &["unit", "scale", COUNTS_AS, BARS]),
-        Role::Extensive => ("an extensive quantity", &["unit", "scale", HIDDEN, ONLY_WITH, MATTER]),
+        Role::Extensive => ("an extensive quantity", &["unit", "scale", HIDDEN, ONLY_WITH, MATTER, OUTSIDE]),
         Role::Derived => ("a derived quantity", &["unit", HIDDEN, INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
         Role::Param => ("a parameter", &["above", "at_least", "at_most", GIVEN_BY, GIVES, GIVES_AT]),
@@ -45,6 +45,7 @@ fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
         BARS if word(given, BARS).is_none() => "`bars` names the failure of what uses the thing",
         ONLY_WITH if word(given, ONLY_WITH).is_none() => "`only_with` names a parameter",
         MATTER if !is_true(&o.value) => "`matter` is `true`, or left out",
+        OUTSIDE if !is_true(&o.value) => "`outside` is `true`, or left out",
         GIVES_AT if !matches!(&*o.value.kind, ExprKind::Range(..)) => "`gives_at` is a range",
         GIVES if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`gives` is the name of a species in quotes",
         INSTEAD if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`instead` is a text",
@@ -53,7 +54,7 @@ fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
     Some(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else"))
 }
 
-/// `matter` where there is no amount of each species.
+/// `matter` or `outside` where there is no amount of each species.
 pub fn matter(
     lab: &Elaborator<'_>,
     role: Role,
@@ -61,13 +62,14 @@ pub fn matter(
     ty: &Type,
     given: &[NamedExpr],
 ) -> Option<Diagnostic> {
-    let o = given.iter().find(|o| o.name.text == MATTER).filter(|_| role == Role::Extensive)?;
+    let is_one = |o: &&NamedExpr| matches!(o.name.text.as_str(), MATTER | OUTSIDE);
+    let o = given.iter().find(is_one).filter(|_| role == Role::Extensive)?;
     let amount = lab.tables.units.named("Amount");
     let is_amount = matches!(ty, Type::Quantity { dimension, .. } if dimension.agrees(&amount));
     if each_species && is_amount {
         return None;
     }
-    let headline = "only an `Amount per Species` can be matter";
+    let headline = format!("only an `Amount per Species` can be `{}`", o.name.text);
     Some(Diagnostic::error(codes::TYPE_MISMATCH, o.name.span, headline, "no amount of each species"))
 }
 

@@ -32,6 +32,8 @@ pub struct EquilibriumDef<'a> {
     pub terms: Vec<(SpeciesId, f64)>,
     /// Which of them are pure solids.
     pub solids: Vec<SpeciesId>,
+    /// The gas whose solubility it says, with what it dissolves as: then it says nothing of amounts, and is solved for the pressure alone.
+    pub gas: Option<(SpeciesId, SpeciesId)>,
     /// Its fields.
     pub fields: &'a [Field],
     /// Its equation.
@@ -78,6 +80,13 @@ pub fn collect<'a>(
             continue;
         }
         let solids = solids(species, (&left, &right), fields);
+        let gas = match gas_form(species, (&left, &right), equation, &out) {
+            Ok(gas) => gas,
+            Err(d) => {
+                diagnostics.push(*d);
+                continue;
+            }
+        };
         let mut terms: Vec<(SpeciesId, f64)> = Vec::new();
         for (s, n) in left.into_iter().map(|(s, n)| (s, -n)).chain(right) {
             match terms.iter_mut().find(|(t, _)| *t == s) {
@@ -87,7 +96,7 @@ pub fn collect<'a>(
         }
         terms.retain(|(_, n)| *n != 0.0);
         let (name, span) = (name.text.clone(), name.span);
-        out.push(EquilibriumDef { name, module: decl.module, terms, solids, fields, equation, span });
+        out.push(EquilibriumDef { name, module: decl.module, terms, solids, gas, fields, equation, span });
     }
     out
 }
@@ -159,11 +168,54 @@ fn check_form(
             diagnostics.push(d.help("write it as a reduction, with `e-` on the left"));
         }
     }
-    let is_one_solid = dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || *n == 1.0);
+    let is_one_solid =
+        dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || (*n == 1.0 && !species.get(*s).is_gas));
     if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")).filter(|_| !is_one_solid) {
         let headline = "a solubility product is that of one solid: `AgCl <-> Ag+ + Cl-`";
         let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
         diagnostics.push(d.because(f.key.span, "the solubility product stands here"));
+    }
+}
+
+/// The gas of an equation and what it dissolves as, `CO2(g) <-> CO2`; an error where a gas stands in an equation of another form, or where
+/// one `before` has it.
+fn gas_form(
+    species: &SpeciesTable<'_>,
+    (left, right): Sides<'_>,
+    equation: Span,
+    before: &[EquilibriumDef<'_>],
+) -> Result<Option<(SpeciesId, SpeciesId)>, Box<Diagnostic>> {
+    let is_gas = |(s, _): &&(SpeciesId, f64)| species.get(*s).is_gas;
+    let Some(&(gas, _)) = left.iter().chain(right).find(is_gas) else { return Ok(None) };
+    let name = &species.get(gas).name;
+    let wrong = |headline: String, label: &str| {
+        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, label);
+        Box::new(d.help("write what the gas dissolves as, and what becomes of that by itself: `CO2(g) <-> CO2`"))
+    };
+    let dry = |side: &'_ [(SpeciesId, f64)]| -> Vec<(SpeciesId, f64)> {
+        side.iter().copied().filter(|(s, _)| !species.get(*s).is_water).collect()
+    };
+    let headline = format!("the equilibrium of `{name}` says how much of it dissolves");
+    let [(dissolved, one)] = dry(right)[..] else {
+        return Err(wrong(headline, "its right side is not one dissolved species"));
+    };
+    if dry(left).len() != 1 || !species.get(dry(left)[0].0).is_gas {
+        return Err(wrong(headline, "its left side is not one gas"));
+    }
+    if one != 1.0 || dry(left)[0].1 != 1.0 {
+        return Err(wrong(headline, "of the gas and of what it dissolves as there is one each"));
+    }
+    let def = species.get(dissolved);
+    let is_charged = def.formula.as_ref().is_some_and(|f| f.charge != 0);
+    if def.is_gas || def.is_electron || is_charged || !def.dissolves.is_empty() || def.name.ends_with("(s)") {
+        return Err(wrong(headline, &format!("`{}` is not a neutral species that is dissolved", def.name)));
+    }
+    match before.iter().find(|e| e.gas.is_some_and(|(other, _)| other == gas)) {
+        Some(first) => {
+            let d = wrong(format!("`{name}` has two equilibria"), "the second one");
+            Err(Box::new(d.because(first.equation, format!("`{}` is the first one", first.name))))
+        }
+        None => Ok(Some((gas, dissolved))),
     }
 }
 

@@ -40,6 +40,13 @@ pub fn collect<'a>(
                 .push(d.help("write the whole reaction, or an equilibrium: `equilibrium iron: Fe3+ + e- <-> Fe2+`"));
             continue;
         }
+        if let Some((gas, _)) = left.iter().chain(&right).find(|(s, _)| species.get(*s).is_gas) {
+            let gas = &species.get(*gas).name;
+            let headline = format!("`{}` names the gas `{gas}`, of which no mixture holds any", name.text);
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "a gas stands in its equilibrium");
+            diagnostics.push(d.help("write what is dissolved: CO2 for CO2(g)"));
+            continue;
+        }
         check_balance(species, &left, &right, equation, &name.text, diagnostics);
         check_template(species, &left, &right, fields, diagnostics);
         let terms = |list: &[Term], ids: &[(super::SpeciesId, f64)]| -> Vec<_> {

@@ -26,6 +26,8 @@ pub struct SpeciesDef<'a> {
     pub is_water: bool,
     /// Whether it is the electron of half-cells, of which there is never any.
     pub is_electron: bool,
+    /// Whether it is a gas: its name ends with `(g)`. No mixture holds any of it.
+    pub is_gas: bool,
     /// Its structure, where one is declared.
     pub structure: Option<Structure>,
     /// kg/mol; 1 for a species counted by mass.
@@ -284,6 +286,7 @@ fn species<'a>(
         formula,
         is_water,
         is_electron,
+        is_gas: name.text.ends_with("(g)"),
         structure,
         molar_mass,
         by_mass,

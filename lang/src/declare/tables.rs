@@ -350,6 +350,9 @@ fn second_matter(kind: &Kind<'_>, first: &MemberRef<'_>, second: &MemberRef<'_>)
 /// The option of an extensive quantity per species that says that it is matter.
 pub const MATTER: &str = "matter";
 
+/// The option of an amount of each species that says that it counts what lies outside of all mixtures: balances of matter have it.
+pub const OUTSIDE: &str = "outside";
+
 /// Whether a member is an extensive quantity of each species.
 pub fn per_species(member: &Member) -> bool {
     matches!(&member.kind, MemberKind::Value { role: Role::Extensive, per: Some(_), .. })

@@ -96,10 +96,21 @@ impl Elaborator<'_> {
         Balance { name: member.to_string(), total, exchanges, unit, magnitude, terms, doubts: Vec::new() }
     }
 
+    /// Species of which an amount that was put somewhere may fall below 0: laws take out of all mixtures what equilibria make of others.
+    pub fn overdrawn(&self) -> BTreeSet<SpeciesId> {
+        let is_taken =
+            |(s, state): &&(SpeciesId, u32)| self.rates.contains_key(state) && !self.tables.species.get(*s).is_water;
+        self.outside.iter().filter(is_taken).map(|(s, _)| *s).collect()
+    }
+
     /// Elements, charge and mass: nothing crosses the boundary.
     fn matter_balances(&mut self, balances: &mut Vec<Balance>, derivatives: &mut Vec<Derivative>) {
-        let amounts: Vec<(SpeciesId, u32)> =
-            self.extensive.iter().filter_map(|(key, index)| Some((key.matter()?, *index))).collect();
+        let amounts: Vec<(SpeciesId, u32)> = self
+            .extensive
+            .iter()
+            .filter_map(|(key, index)| Some((key.matter()?, *index)))
+            .chain(self.outside.iter().copied())
+            .collect();
         let of = self.quantities(amounts.iter().map(|a| a.0).collect::<BTreeSet<_>>().into_iter());
         let doubtful = self.doubtful();
         let elements = of.keys().filter(|name| name.starts_with("element"));

@@ -4,7 +4,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 
 use super::{Num, Scope, Value};
-use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
+use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Name, Param};
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::lab::Mode;
 use crate::eval::lab::{Elaborator, Pair};
@@ -42,6 +42,9 @@ impl<'a> Elaborator<'a> {
                     Value::Function(id)
                 }
                 _ => {
+                    if let Some(species) = self.species_in_phase(n, args, scope) {
+                        return species;
+                    }
                     let mut d = self.tables.names.unknown(scope.module, n, "function", |k| {
                         matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })
                     });
@@ -58,6 +61,16 @@ impl<'a> Elaborator<'a> {
             Value::Method(of, name) => self.call_method(*of, &name, args, span, scope),
             other => self.expected("a function", &other, callee.span),
         }
+    }
+
+    /// `CO2(g)`: a species whose name ends with its phase, which reads as a call.
+    fn species_in_phase(&mut self, n: &Name, args: &[Arg], scope: &Scope) -> Option<Value> {
+        let [Arg { name: None, value }] = args else { return None };
+        let ExprKind::Name(phase) = &*value.kind else { return None };
+        let id = self.lookup(scope.module, &format!("{}({})", n.text, phase.text))?;
+        let species = self.tables.species.of_decl(id)?;
+        self.note_declared(n.span, id);
+        Some(Value::Species(species))
     }
 
     fn is_function(&self, id: DeclId) -> bool {

@@ -57,6 +57,8 @@ pub struct Speciation {
     pub system: Arc<System>,
     /// Its species, in the order of the members.
     pub members: Vec<SpeciesId>,
+    /// So many of them, the first ones, are in its equations; the others are there for their activities alone.
+    pub moved: usize,
     /// Which of all equilibria they are.
     pub equilibria: Vec<usize>,
     /// What it rests on, in the order of [`Layout`].
@@ -126,7 +128,8 @@ impl<'a> Elaborator<'a> {
         let here: BTreeMap<SpeciesId, u32> = self.amounts_in(id).collect();
         let equilibria: Vec<usize> = (0..self.tables.equilibria.len())
             .filter(|e| {
-                self.tables.equilibria[*e].terms.iter().all(|(s, _)| here.contains_key(s) || self.is_formal(*s))
+                let def = &self.tables.equilibria[*e];
+                def.gas.is_none() && def.terms.iter().all(|(s, _)| here.contains_key(s) || self.is_formal(*s))
             })
             .collect();
         let water = here.keys().copied().find(|s| self.tables.species.get(*s).is_water)?;
@@ -138,7 +141,15 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        if equilibria.is_empty() {
+        let moved = members.len();
+        // What gases dissolve as has an activity, whether an equation moves it or not.
+        let dissolved = self.tables.equilibria.iter().filter_map(|e| Some(e.gas?.1));
+        for s in dissolved.filter(|s| here.contains_key(s)).collect::<BTreeSet<_>>() {
+            if !members.contains(&s) {
+                members.push(s);
+            }
+        }
+        if members.len() == 1 {
             return None;
         }
         let acting = match self.spread_of_interactions(id) {
@@ -161,7 +172,7 @@ impl<'a> Elaborator<'a> {
             Some(acting) => self.with_interactions(args, &acting, system.layout())?,
             None => args.into(),
         };
-        Some(Speciation { system, members, equilibria, args })
+        Some(Speciation { system, members, moved, equilibria, args })
     }
 
     fn is_formal(&self, s: SpeciesId) -> bool {
@@ -549,14 +560,21 @@ impl<'a> Elaborator<'a> {
 
     /// The circles of all equilibria of the file.
     fn all_circles(&self) -> Result<Vec<Circle>, Unsettled> {
-        let all: Vec<usize> = (0..self.tables.equilibria.len()).collect();
+        // A gas stands in one equation alone.
+        let is_dissolved = |e: &usize| self.tables.equilibria[*e].gas.is_none();
+        let all: Vec<usize> = (0..self.tables.equilibria.len()).filter(is_dissolved).collect();
         let water = self.tables.species.iter().map(|(s, _)| s).find(|s| self.tables.species.get(*s).is_water);
         let mut members: Vec<SpeciesId> = water.into_iter().collect();
         let mut known: BTreeSet<SpeciesId> = members.iter().copied().collect();
-        let terms = self.tables.equilibria.iter().flat_map(|e| e.terms.iter().map(|(s, _)| *s));
+        let terms = all.iter().flat_map(|e| self.tables.equilibria[*e].terms.iter().map(|(s, _)| *s));
         members.extend(terms.filter(|s| known.insert(*s)));
         let system = System::try_from(self.written_system(&members, &all))?;
-        Ok(system.circles().to_vec())
+        let of_all = |circle: &Circle| {
+            let mut factors = vec![0.0; self.tables.equilibria.len()];
+            all.iter().zip(&circle.factors).for_each(|(e, factor)| factors[*e] = *factor);
+            Circle { factors }
+        };
+        Ok(system.circles().iter().map(of_all).collect())
     }
 
     fn check_circle(&mut self, factors: &[f64]) {
@@ -618,7 +636,11 @@ impl<'a> Elaborator<'a> {
 
     /// `-log10` and the like of the activity of a species at equilibrium; `otherwise` where it takes part in none.
     pub fn activity_of(&mut self, id: InstanceId, s: SpeciesId, otherwise: &Num) -> Value {
-        match self.settled(id, |speciation| Some(Part::Activity(speciation.place(s)?))) {
+        if let Some(e) = self.of_gas(s) {
+            let node = self.activity_of_gas(id, e).unwrap_or(otherwise.node);
+            return Value::Num(Num { node, literal: false, ..otherwise.clone() });
+        }
+        match self.settled(id, |speciation| Some(Part::Activity(speciation.place_of_any(s)?))) {
             Some(node) => {
                 let node = self.graph.unary(UnaryOp::Exp, node);
                 Value::Num(Num { node, literal: false, ..otherwise.clone() })
@@ -627,15 +649,81 @@ impl<'a> Elaborator<'a> {
         }
     }
 
+    /// The equilibrium of a gas.
+    pub fn of_gas(&self, s: SpeciesId) -> Option<usize> {
+        self.tables.equilibria.iter().position(|e| e.gas.is_some_and(|(gas, _)| gas == s))
+    }
+
+    /// The activity that a gas has where it is at rest with what is dissolved: its equation is met. None where nothing of it can be there.
+    pub fn activity_of_gas(&mut self, id: InstanceId, e: usize) -> Option<NodeId> {
+        let speciation = self.speciation(id)?;
+        let mut sum =
+            self.constant_at(e, |lab| Some(lab.graph.solved(&speciation.system, Part::Temperature, &speciation.args)))?;
+        sum = self.multiple(-1.0, sum);
+        let def = &self.tables.equilibria[e];
+        let (gas, _) = def.gas?;
+        for (s, count) in def.terms.clone().into_iter().filter(|(s, _)| *s != gas) {
+            let part = Part::Activity(speciation.place_of_any(s)?);
+            let activity = self.graph.solved(&speciation.system, part, &speciation.args);
+            let activity = self.multiple(count, activity);
+            sum = self.graph.binary(BinaryOp::Add, activity, sum);
+        }
+        Some(self.graph.unary(UnaryOp::Exp, sum))
+    }
+
+    /// The logarithm of a constant at a temperature.
+    pub fn constant_at(&mut self, e: usize, temperature: impl FnOnce(&mut Self) -> Option<NodeId>) -> Option<NodeId> {
+        let Constant { terms, .. } = self.constant_of(e)?;
+        let t = temperature(self)?;
+        let (ln, square) = (self.graph.unary(UnaryOp::Ln, t), self.graph.binary(BinaryOp::Mul, t, t));
+        let one = self.graph.number(1.0);
+        let over = |lab: &mut Self, node| lab.graph.binary(BinaryOp::Div, one, node);
+        let of = [one, over(self, t), ln, t, over(self, square), square];
+        Some(self.sum_of(&terms, &of))
+    }
+
+    /// The enthalpy of an equation at a temperature: R T^2 d(ln K) / dT.
+    pub fn enthalpy_at(&mut self, e: usize, t: NodeId) -> Option<NodeId> {
+        let Constant { terms, .. } = self.constant_of(e)?;
+        let square = self.graph.binary(BinaryOp::Mul, t, t);
+        let one = self.graph.number(1.0);
+        let inverse = self.graph.binary(BinaryOp::Div, one, t);
+        let cube = self.graph.binary(BinaryOp::Mul, square, t);
+        let numbers = [(0.0, one), (-GAS, one), (GAS, t), (GAS, square), (-2.0 * GAS, inverse), (2.0 * GAS, cube)];
+        let of = numbers.map(|(factor, node)| self.multiple(factor, node));
+        Some(self.sum_of(&terms, &of))
+    }
+
+    fn sum_of(&mut self, terms: &[NodeId], of: &[NodeId]) -> NodeId {
+        let mut sum = self.graph.number(0.0);
+        for (term, of) in terms.iter().zip(of) {
+            let part = self.graph.binary(BinaryOp::Mul, *term, *of);
+            sum = self.graph.binary(BinaryOp::Add, sum, part);
+        }
+        sum
+    }
+
+    /// Whether the equilibrium of a gas has a constant at a temperature.
+    pub fn gas_holds(&mut self, e: usize, temperature: NodeId) -> NodeId {
+        match self.window_of(e) {
+            Some(window) => self.within(window, temperature),
+            None => self.graph.number(1.0),
+        }
+    }
+
+    fn within(&mut self, (low, high): (NodeId, NodeId), temperature: NodeId) -> NodeId {
+        let above = self.graph.binary(BinaryOp::Le, low, temperature);
+        let below = self.graph.binary(BinaryOp::Le, temperature, high);
+        self.graph.binary(BinaryOp::And, above, below)
+    }
+
     /// Whether all equilibria of a mixture have constants at a temperature.
     pub fn equilibria_hold(&mut self, id: InstanceId, temperature: NodeId) -> NodeId {
         let mut holds = self.graph.number(1.0);
         let Some(speciation) = self.speciation(id) else { return holds };
         for e in speciation.equilibria.iter().copied() {
-            let Some((low, high)) = self.window_of(e) else { continue };
-            let above = self.graph.binary(BinaryOp::Le, low, temperature);
-            let below = self.graph.binary(BinaryOp::Le, temperature, high);
-            let within = self.graph.binary(BinaryOp::And, above, below);
+            let Some(window) = self.window_of(e) else { continue };
+            let within = self.within(window, temperature);
             holds = self.graph.binary(BinaryOp::And, holds, within);
         }
         holds
@@ -677,8 +765,13 @@ const WARM: f64 = 333.15;
 const CLOSED: f64 = 0.05;
 
 impl Speciation {
-    /// The number of a species among the members.
+    /// The number of a species among the members that equations move.
     pub fn place(&self, s: SpeciesId) -> Option<u32> {
+        self.place_of_any(s).filter(|i| (*i as usize) < self.moved && !self.equilibria.is_empty())
+    }
+
+    /// The number of a species among all members.
+    fn place_of_any(&self, s: SpeciesId) -> Option<u32> {
         self.members.iter().position(|m| *m == s).map(|i| i as u32)
     }
 }

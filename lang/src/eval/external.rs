@@ -100,6 +100,20 @@ enum Bound {
     EquilibriaHold,
     /// The heat of coming to equilibrium at the start.
     HeatAtStart,
+    /// The activity that a gas has where it is at rest with a mixture.
+    GasActivity,
+    /// The gases of the file's equilibria.
+    Gases,
+    /// The species of the equilibrium of a gas, beside it.
+    GasBecomes,
+    /// How much of a species a mole of a gas becomes as it dissolves.
+    GasGives,
+    /// The constant of the equilibrium of a gas at a temperature.
+    Henry,
+    /// The heat that a mole of gas takes up as it dissolves at a temperature.
+    HeatOfGas,
+    /// Whether the equilibrium of a gas has a constant at a temperature.
+    GasHolds,
     /// What is kept of a quantity over a whole run.
     OverTime(Keep),
 }
@@ -118,6 +132,13 @@ const TABLE: &[(&str, Bound)] = &[
     ("settled_strength", Bound::IonicStrength),
     ("equilibria_hold", Bound::EquilibriaHold),
     ("heat_at_start", Bound::HeatAtStart),
+    ("gas_activity", Bound::GasActivity),
+    ("gases", Bound::Gases),
+    ("gas_becomes", Bound::GasBecomes),
+    ("gas_gives", Bound::GasGives),
+    ("henry", Bound::Henry),
+    ("heat_of_gas", Bound::HeatOfGas),
+    ("gas_holds", Bound::GasHolds),
     ("exp", Bound::Unary(UnaryOp::Exp)),
     ("ln", Bound::Unary(UnaryOp::Ln)),
     ("sin", Bound::Unary(UnaryOp::Sin)),
@@ -333,6 +354,44 @@ impl Elaborator<'_> {
                 let node = node.unwrap_or_else(|| self.graph.number(0.0));
                 self.num(node, self.tables.units.named("Energy"))
             }
+            (Bound::GasActivity, [Value::Instance(m), Value::Species(g)]) => {
+                let Some(e) = self.of_gas(*g) else { return self.without_gas(*g, at) };
+                let node = self.activity_of_gas(*m, e).unwrap_or_else(|| self.graph.number(0.0));
+                self.num(node, Dimension::one())
+            }
+            (Bound::Gases, []) => {
+                let gases = self.tables.equilibria.iter().filter_map(|e| Some(Value::Species(e.gas?.0)));
+                Value::List(gases.collect())
+            }
+            (Bound::GasBecomes, [Value::Species(g)]) => {
+                let terms = self.of_gas(*g).map(|e| self.tables.equilibria[e].terms.as_slice());
+                let others = terms.into_iter().flatten().filter(|(s, _)| s != g);
+                Value::List(others.map(|(s, _)| Value::Species(*s)).collect())
+            }
+            (Bound::GasGives, [Value::Species(g), Value::Species(s)]) => {
+                let terms = self.of_gas(*g).map(|e| self.tables.equilibria[e].terms.as_slice());
+                let count = terms.into_iter().flatten().find(|(other, _)| other == s).map_or(0.0, |(_, n)| *n);
+                self.number(count, Dimension::one(), false)
+            }
+            (Bound::Henry, [Value::Species(g), Value::Num(t)]) => {
+                let ln = self.of_gas(*g).and_then(|e| self.constant_at(e, |_| Some(t.node)));
+                let node = match ln {
+                    Some(ln) => self.graph.unary(UnaryOp::Exp, ln),
+                    None => return self.without_gas(*g, at),
+                };
+                self.num(node, Dimension::one())
+            }
+            (Bound::HeatOfGas, [Value::Species(g), Value::Num(t)]) => {
+                let Some(node) = self.of_gas(*g).and_then(|e| self.enthalpy_at(e, t.node)) else {
+                    return self.without_gas(*g, at);
+                };
+                self.num(node, self.tables.units.named("Energy").over(&self.tables.units.named("Amount")))
+            }
+            (Bound::GasHolds, [Value::Species(g), Value::Num(t)]) => match self.of_gas(*g) {
+                Some(e) => Value::Bool(self.gas_holds(e, t.node)),
+                None if self.prototype => self.certain(true),
+                None => self.without_gas(*g, at),
+            },
             (Bound::Stated, [Value::Material(id), Value::Text(what)]) => self.stated(*id, what),
             (Bound::Stated, [Value::Nothing, Value::Text(_)]) => Value::Unlimited,
             (Bound::OverTime(keep), [Value::Num(n)]) => self.over_time(*keep, n, name, at),
@@ -347,6 +406,21 @@ impl Elaborator<'_> {
             Some(ty) => self.coerce(computed, &ty, at, name),
             None => computed,
         }
+    }
+
+    /// A species is asked for as a gas of which no equilibrium says how much dissolves.
+    fn without_gas(&mut self, s: SpeciesId, at: Span) -> Value {
+        if self.prototype {
+            return self.number(1.0, Dimension::any(), false);
+        }
+        let at = self.calls.first().copied().unwrap_or(at);
+        let name = self.tables.species.get(s).name.clone();
+        let headline = format!("no equilibrium of the file has `{name}` as a gas");
+        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, at, headline, "asked for here");
+        self.report(
+            d.help("write how much of it dissolves: `equilibrium dissolves: CO2(g) <-> CO2 { log_constant: -1.47 }`, or `use std::gases`"),
+        );
+        Value::Error
     }
 
     /// A truth that is known before anything runs.

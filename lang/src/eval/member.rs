@@ -675,10 +675,10 @@ impl<'a> Elaborator<'a> {
 
     fn species_named(&mut self, known: Option<SpeciesId>, word: &Name, scope: &Scope) -> Option<SpeciesId> {
         if known.is_some() {
-            return known;
+            return known.filter(|s| !self.is_refused_as_gas(*s, word));
         }
         match self.tables.species.lookup(self.tables.names, scope.module, word) {
-            Ok(s) => Some(s),
+            Ok(s) => Some(s).filter(|s| !self.is_refused_as_gas(*s, word)),
             Err(d) => {
                 self.report(*d);
                 None

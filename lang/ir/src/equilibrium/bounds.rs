@@ -99,6 +99,9 @@ impl System {
         let (mut radius, mut slopes) = (0.0_f64, Vec::new());
         for share in [0.0, 0.5, 1.0] {
             self.slopes(part, &at(share), &by, &mut slopes);
+            if slopes.iter().any(|slope| slope.is_nan()) {
+                return ALL;
+            }
             let reach = |(i, slope): (&usize, &f64)| slope.abs() * (args[*i].1 - args[*i].0);
             radius = radius.max(0.5 * MARGIN * by.iter().zip(&slopes).map(reach).sum::<f64>());
         }

@@ -96,6 +96,9 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
             given.push(solid);
         }
     }
+    if !may_hold(&free) {
+        return None;
+    }
     let start = free.start(&totals);
     let bracketed = |halvings| match formal::bracketed(&free, halvings)? {
         Begin::Near(start, held) => follow(&free, &start, &lacking, held),
@@ -109,24 +112,46 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
     found.or_else(|| by_temperature(&free, &lacking))
 }
 
+/// Whether some temperature has the heat content that is given. One that may be far outside is asked for at both ends, which is two
+/// solutions in place of a long search for one that is not there.
+fn may_hold(free: &Problem<'_>) -> bool {
+    if free.is_isothermal() {
+        return true;
+    }
+    let (heat, capacity) = (free.args[free.layout.heat()], free.args[free.layout.capacity()]);
+    let (low, high) = TEMPERATURES;
+    let guess = free.reference() + heat / capacity;
+    if low <= guess && guess <= high {
+        return true;
+    }
+    let below = |t: f64| held_at(free, t).is_none_or(|(holds, _)| holds <= heat);
+    let above = |t: f64| held_at(free, t).is_none_or(|(holds, _)| holds >= heat);
+    below(low) && above(high)
+}
+
+/// The heat content that a temperature makes, J, with the solution there.
+fn held_at(free: &Problem<'_>, temperature: f64) -> Option<(f64, Solution)> {
+    let layout = free.layout;
+    let mut args = free.args.to_vec();
+    (args[layout.capacity()], args[layout.heat()]) = (f64::INFINITY, 0.0);
+    args[layout.reference()] = temperature;
+    let solution = solve(free.system, &args)?;
+    let capacity = free.args[layout.capacity()] + solution.capacity;
+    Some((solution.heat + capacity * (temperature - free.reference()), solution))
+}
+
 /// The solution where the heat content and the rest are hard to meet at once: the temperature is bracketed, as a heat content grows with
 /// it, and then all goes on from there.
 fn by_temperature(free: &Problem<'_>, lacking: &[f64]) -> Option<Solution> {
     if free.is_isothermal() {
         return None;
     }
-    let layout = free.layout;
-    let mut args = free.args.to_vec();
-    (args[layout.capacity()], args[layout.heat()]) = (f64::INFINITY, 0.0);
     let (mut low, mut high) = TEMPERATURES;
     let mut last = None;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        args[layout.reference()] = middle;
-        let solution = solve(free.system, &args)?;
-        let capacity = free.args[layout.capacity()] + solution.capacity;
-        let holds = solution.heat + capacity * (middle - free.reference());
-        if holds < free.args[layout.heat()] {
+        let (holds, solution) = held_at(free, middle)?;
+        if holds < free.args[free.layout.heat()] {
             low = middle
         } else {
             high = middle

@@ -302,6 +302,13 @@ pub fn turns(subject: Subject<'_, '_>) -> Turns {
     }
 }
 
+/// States that are amounts of species, and never below 0.
+fn amounts(lab: &Elaborator<'_>) -> BTreeSet<u32> {
+    let overdrawn = lab.overdrawn();
+    let matter = lab.extensive.iter().filter_map(|(key, state)| Some((key.matter()?, *state)));
+    matter.filter(|(s, _)| !overdrawn.contains(s)).map(|(_, state)| state).collect()
+}
+
 impl<'l, 'a> Interpreter<'l, 'a> {
     fn new(subject: Subject<'l, 'a>) -> Self {
         let Subject { lab, sources, plan, derivatives, events } = subject;
@@ -334,7 +341,7 @@ impl<'l, 'a> Interpreter<'l, 'a> {
             veiled: Vec::new(),
             stopped: false,
             limit_taken: false,
-            amounts: lab.extensive.iter().filter(|(k, _)| k.matter).map(|(_, s)| *s).collect(),
+            amounts: amounts(lab),
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),
             findings: Vec::new(),

@@ -220,6 +220,8 @@ pub struct Elaborator<'a> {
     pub targets: targets::Targets,
     /// Extensive quantities by place.
     pub extensive: BTreeMap<ExtensiveKey, u32>,
+    /// Amounts that lie outside of all mixtures, as what a gas phase has taken: of which species, and their states.
+    pub outside: Vec<(SpeciesId, u32)>,
     /// Names of all fields that are given in the lab, once they were asked for.
     pub given: Option<FxHashSet<&'a str>>,
     /// How devices are spoken to, where that was asked for.
@@ -344,6 +346,7 @@ impl<'a> Elaborator<'a> {
             states: Vec::new(),
             targets: targets::Targets::default(),
             extensive: BTreeMap::new(),
+            outside: Vec::new(),
             drivers: Vec::new(),
             offers: matterix_ir::offer::Offers::default(),
             readings: Vec::new(),

@@ -172,7 +172,7 @@ fn close(set: &mut BTreeSet<SpeciesId>, tables: &Tables<'_>) {
                 set.extend(r.products.iter().map(|p| p.0));
             }
         }
-        for e in &tables.equilibria {
+        for e in tables.equilibria.iter().filter(|e| e.gas.is_none()) {
             let is_there = |left: bool| {
                 let mut side = e.terms.iter().filter(|(_, n)| (*n < 0.0) == left);
                 side.all(|(s, _)| set.contains(s) || tables.species.get(*s).is_water || is_formal(s))

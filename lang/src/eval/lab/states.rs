@@ -13,7 +13,7 @@ use super::{Elaborator, ExtensiveKey, MemberKey};
 use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
 use crate::declare::SpeciesId;
 use crate::declare::Type;
-use crate::declare::tables::{MemberRef, is_true};
+use crate::declare::tables::{MemberRef, OUTSIDE, is_true};
 use crate::eval::{Num, Scope, Value};
 
 impl<'a> Elaborator<'a> {
@@ -29,12 +29,16 @@ impl<'a> Elaborator<'a> {
             let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
             if per.is_some() {
                 let matter = self.is_matter(id, m);
+                let is_outside = options.iter().any(|o| o.name.text == OUTSIDE && is_true(&o.value));
                 for s in self.mixture_species(id) {
                     let species = self.tables.species.get(s).name.clone();
                     let index = self.allocate(id, format!("{full}[{species}]"), &ty, options, scale, m.member.span);
                     self.instances[id.0 as usize].amounts.entry(name.text.clone()).or_default().insert(s, index);
                     let key = ExtensiveKey { instance: id, member: name.text.clone(), species: Some(s), matter };
                     self.extensive.insert(key, index);
+                    if is_outside {
+                        self.outside.push((s, index));
+                    }
                 }
                 continue;
             }

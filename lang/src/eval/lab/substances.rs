@@ -27,6 +27,9 @@ impl Elaborator<'_> {
                 self.report(d.help("give what takes up electrons, or gives them: Fe3+, or Fe2+"));
                 return None;
             }
+            if self.is_refused_as_gas(s, name) {
+                return None;
+            }
             return Some(Substance::Species(s));
         }
         let is_solution = |k: &crate::ast::ItemKind| matches!(k, crate::ast::ItemKind::Solution { .. });
@@ -38,5 +41,18 @@ impl Elaborator<'_> {
         });
         self.report(d);
         None
+    }
+
+    /// Whether a species is a gas, of which no mixture holds any, and says so where it is asked for as if one did.
+    pub fn is_refused_as_gas(&mut self, s: SpeciesId, name: &Name) -> bool {
+        let is_gas = self.tables.species.get(s).is_gas && !self.prototype;
+        if is_gas {
+            let headline = format!("no vessel holds `{}`: there is no gas phase", name.text);
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, name.span, headline, "stands in equilibria alone");
+            let plain = name.text.trim_end_matches("(g)");
+            let help = format!("name what is dissolved of it: `{plain}`");
+            self.report(d.help(help).help("a `GasExchange` of std::gases says what gas is above a vessel"));
+        }
+        is_gas
     }
 }
