@@ -137,7 +137,7 @@ fn a_vessel_that_is_closed_to_gases_is_warned_of() {
         ("use std::gases", "", acid, "gases bubble off from `cup`"),
         ("use std::gases", "", "100 g of water + 2 mmol of CO2", ""),
         ("use std::gases", OPEN, acid, ""),
-        ("use std::equilibria", "", acid, "acid on HCO3- gives off gas"),
+        ("use std::equilibria", "", acid, "acid releases gas from HCO3-"),
         ("use std::equilibria", "", "100 g of water + 10 mmol of CO2", "gets more CO2 than stays dissolved"),
         ("use std::gases", OPEN, "100 g of water + 500 mmol of NH3", "more NH3(g) than Henry's law is good for"),
         ("use std::gases", OPEN, "100 g of water at 70 degC", "how much H2S(g) dissolves is not known"),
