@@ -83,7 +83,7 @@ fn a_limit_is_a_share() {
         write(&dir, "lab.mtx", text);
         let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
         assert!(
-            ended.code == 1 && ended.out.contains("times the speed of `panda` is asked for"),
+            ended.code == 1 && ended.out.contains("`panda` cannot move at "),
             "{}{}",
             ended.out,
             ended.err
