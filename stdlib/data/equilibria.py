@@ -262,9 +262,10 @@ def section(entry, all_species, all_equilibria):
         lines += [f"{title[0].upper()}{title[1:]}:", "", listed(row["name"] for row in rows), ""]
     tail = HERE / "modules" / f"{name}.more"
     if tail.exists():
-        found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)", tail.read_text(encoding="utf8"), re.M)
+        found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)(?:\((.*?)\))?", tail.read_text(encoding="utf8"), re.M)
         lines += ["| name | is |", "| --- | --- |"]
-        lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}` | {doc} |" for doc, kind, word in found] + [""]
+        taken = {word: "(" + ", ".join(re.findall(r"(\w+):", given)) + ")" for _, kind, word, given in found if kind == "fn"}
+        lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}{taken.get(word, '')}` | {doc} |" for doc, kind, word, _ in found] + [""]
     if name != "equilibria":
         return "\n".join(lines + ([f"Equilibria ({len(rules)}):", "", listed(row["name"] for row in rules), ""] if rules else []))
     lines += ["| equilibrium | constant at 25 °C | enthalpy, kJ/mol | source |", "| --- | --- | --- | --- |"]
