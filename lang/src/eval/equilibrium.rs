@@ -717,11 +717,14 @@ impl<'a> Elaborator<'a> {
         self.graph.binary(BinaryOp::And, above, below)
     }
 
-    /// Whether all equilibria of a mixture have constants at a temperature.
-    pub fn equilibria_hold(&mut self, id: InstanceId, temperature: NodeId) -> NodeId {
+    /// Whether all equilibria of a mixture, or those that have a species, have constants at a temperature.
+    pub fn equilibria_hold(&mut self, id: InstanceId, of: Option<SpeciesId>, temperature: NodeId) -> NodeId {
         let mut holds = self.graph.number(1.0);
         let Some(speciation) = self.speciation(id) else { return holds };
         for e in speciation.equilibria.iter().copied() {
+            if of.is_some_and(|s| !self.tables.equilibria[e].involves(s)) {
+                continue;
+            }
             let Some(window) = self.window_of(e) else { continue };
             let within = self.within(window, temperature);
             holds = self.graph.binary(BinaryOp::And, holds, within);
