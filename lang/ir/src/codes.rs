@@ -96,6 +96,7 @@ codes! {
     NEVER_MADE "never-made" "K3" "something waits for or expects a substance that nothing makes";
     UNBALANCED "unbalanced" "K2" "atoms or charge differ between the sides of an equation";
     EQUILIBRIUM_FORM "equilibrium-form" "K2" "an equilibrium is not written as its constant is meant";
+    REACTION_AT_EQUILIBRIUM "reaction-at-equilibrium" "K2" "a reaction does what equilibria of the file do already";
     INTERACTION_FORM "interaction-form" "K2" "an interaction is not between what is dissolved, or its numbers are not those of its charges";
     EQUILIBRIA_CONTRADICT "equilibria-contradict" "K2" "the constants of a circle of equilibria do not agree";
     FORMULA_INVALID "formula-invalid" "K2" "a formula, structure or molar mass is wrong";
