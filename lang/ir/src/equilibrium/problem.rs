@@ -100,6 +100,11 @@ impl<'a> Problem<'a> {
         self.system.virial.as_ref().map_or(&[], |virial| &virial.placed)
     }
 
+    /// What is beside the members; an integrator may try less than none of it.
+    pub(super) fn beside(&self, arg: usize) -> f64 {
+        self.args[arg].max(0.0)
+    }
+
     pub(super) fn given(&self, member: usize) -> f64 {
         self.args[self.layout.amount(member)]
     }
@@ -132,6 +137,11 @@ impl<'a> Problem<'a> {
             let given = self.given(i) - lacking;
             basis.parts.row(i).iter().for_each(|(row, part)| of[*row] += part * given);
             held.iter_mut().zip(&basis.of_held[i]).for_each(|(held, part)| *held += part * given);
+        }
+        // A trace is lost in what cancels to less than nothing.
+        let solvent = of[basis.masters.len()].max(0.0) * self.system.written.solvent_mass;
+        for (c, _) in basis.masters.iter().enumerate().filter(|(_, i)| lacking[**i] != 0.0) {
+            of[c] = TRACE * solvent;
         }
         Totals { of, held }
     }
@@ -204,9 +214,9 @@ impl<'a> Problem<'a> {
         let charge = |i: usize| self.system.members()[i].charge;
         let solutes = self.basis.solutes.iter();
         let ions: f64 = solutes.map(|i| 0.5 * charge(*i) * charge(*i) * self.given(*i).max(0.0)).sum();
-        let strength = (ions + self.args[self.layout.bystanders()]) / solvent + 1e-7;
+        let strength = (ions + self.beside(self.layout.bystanders())) / solvent + 1e-7;
         let solutes: f64 = self.basis.solutes.iter().map(|i| self.given(*i).max(0.0)).sum();
-        let molality = (solutes + self.args[self.layout.bystander_amount()]) / solvent + 1e-7;
+        let molality = (solutes + self.beside(self.layout.bystander_amount())) / solvent + 1e-7;
         let mut x: Vec<f64> = (0..self.basis.masters.len()).map(free).collect();
         x.extend([math::ln(solvent), strength, molality]);
         x.extend(self.placed().iter().map(|i| self.given(*i).max(0.0) / solvent + NO_IONS));

@@ -157,6 +157,7 @@ fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
                 rows[warmth] += (state.enthalpies[i] + state.capacities[i] * state.warmer) / scale;
             }
         }
+        Role::Bystanders | Role::BystanderAmount if problem.args[arg] < 0.0 => {}
         Role::Bystanders => rows[places.strength()] -= state.by_charges,
         Role::BystanderAmount => rows[places.molality()] -= state.by_dissolved,
         Role::Reference if isothermal => rows[warmth] -= 1.0,

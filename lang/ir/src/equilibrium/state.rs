@@ -83,8 +83,8 @@ impl Problem<'_> {
             charges += 0.5 * charge * charge * amount;
             dissolved += amount;
         }
-        state.charges = charges + self.args[self.layout.bystanders()];
-        state.dissolved = dissolved + self.args[self.layout.bystander_amount()];
+        state.charges = charges + self.beside(self.layout.bystanders());
+        state.dissolved = dissolved + self.beside(self.layout.bystander_amount());
         state.amounts[basis.water] = math::exp(x[places.solvent()]) / self.system.written.solvent_mass;
         [state.by_charges, state.by_dissolved] = [state.charges, state.dissolved].map(|sum| self.by_amount(sum, state));
         state.by_placed.clear();

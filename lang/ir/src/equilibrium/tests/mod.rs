@@ -345,3 +345,19 @@ fn what_is_absent_or_dry_is_no_trouble() {
     let dry = acids().build().with(&[("OH-", 1e-2)]);
     assert_eq!(dry.amount("OH-"), 1e-2);
 }
+
+#[test]
+fn a_total_that_rounding_leaves_below_nothing_is_followed() {
+    let iodine = Sketch::new()
+        .equation("-1 water 1 H+ 1 OH-", -13.995, 55.8)
+        .equation("-1 I2 -1 I- 1 I3-", 2.86, 0.0)
+        .build();
+    for excess in [1e-3, 1e-9, 2.9e-14, 1e-20, 0.0, -1e-20, -2.9e-14, -1e-9, -1e-3] {
+        let mixture = Mixture { system: iodine.system.clone(), args: iodine.args.clone() };
+        let mut mixture = mixture.real().with(&[("water", 6.71), ("I2", 1e-3), ("I-", 0.023), ("I3-", excess - 1e-3)]);
+        let layout = mixture.system.layout();
+        (mixture.args[layout.heat()], mixture.args[layout.capacity()]) = (0.168, 503.2);
+        let [two, three] = ["I2", "I3-"].map(|name| mixture.amount(name));
+        assert!((two + three - excess).abs() < 1e-12, "{excess}: {two} {three}");
+    }
+}
