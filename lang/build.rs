@@ -60,13 +60,14 @@ fn imports(tree: &File) -> Vec<String> {
     paths.map(|name| name.text.clone()).collect()
 }
 
-/// The names that a module declares, where it has nothing but species, equilibria, interactions, constants, cautions and imports; the prelude, which
+/// The names that a module declares, where it has nothing but species, equilibria, interactions, constants, functions, cautions and imports; the prelude, which
 /// only imports, is none.
 fn only_matter(tree: &File) -> Option<Vec<String>> {
     let names = tree.items.iter().map(|item| match &item.kind {
         ItemKind::Species { name, .. }
         | ItemKind::Equilibrium { name, .. }
         | ItemKind::Interaction { name, .. }
+        | ItemKind::Fn { name, .. }
         | ItemKind::Const { name, .. } => Some(Some(name.text.clone())),
         ItemKind::Hazard { .. } | ItemKind::Use { .. } => Some(None),
         _ => None,

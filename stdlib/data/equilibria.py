@@ -302,9 +302,10 @@ def section(entry, all_species, all_equilibria, all_interactions):
         lines += [f"{title[0].upper()}{title[1:]}:", "", listed(row["name"] for row in rows), ""]
     tail = HERE / "modules" / f"{name}.more"
     if tail.exists():
-        found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)", tail.read_text(encoding="utf8"), re.M)
+        found = re.findall(r"^/// (.*)\n(const|caution|fn) (\w+)(?:\((.*?)\))?", tail.read_text(encoding="utf8"), re.M)
         lines += ["| name | is |", "| --- | --- |"]
-        lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}` | {doc} |" for doc, kind, word in found] + [""]
+        taken = {word: "(" + ", ".join(re.findall(r"(\w+):", given)) + ")" for _, kind, word, given in found if kind == "fn"}
+        lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}{taken.get(word, '')}` | {doc} |" for doc, kind, word, _ in found] + [""]
     acting = [line.split()[1][:-1] for line in interactions([r for r in all_interactions if r["module"] == name]) if line.startswith("interaction")]
     if acting:
         lines += [f"Interactions ({len(acting)}):", "", listed(acting), ""]

@@ -187,7 +187,7 @@ fn check_takes_nothing_for_held_that_a_failed_motion_may_have_lost() {
         assert!(!ended.out.contains("hand-full") && !ended.out.contains("not-in-hand"), "{name}: {}", ended.out);
     }
     let ended = check("contact_lost_back", "dropped { put back vial by panda }");
-    assert!(ended.out.contains("[not-in-hand]: `put back vial by panda` cannot be done"), "{}", ended.out);
+    assert!(ended.out.contains("[not-in-hand]: `panda` is not holding `vial`"), "{}", ended.out);
 }
 
 /// An environment with its things near by, and not quite where they are taken to be.

@@ -82,3 +82,11 @@ fn bad_arguments_are_said_in_words() {
         assert!(ended.err.contains(wanted), "{args:?}: {}", ended.err);
     }
 }
+
+#[test]
+fn a_protocol_says_the_ph_of_what_is_put_together() {
+    let ended = matterixc(&["doc", "examples/equilibria/carbonated.mtx"]);
+    assert!(ended.out.contains("Its pH is 8.12."), "{}", ended.out);
+    let plain = matterixc(&["doc", "examples/sn1.mtx"]);
+    assert!(!plain.out.contains("Its pH"), "{}", plain.out);
+}

@@ -80,10 +80,10 @@ fn a_ph_that_the_equilibria_do_not_give_is_warned_of() {
     let cases = [
         (all, "100 g of water + 10 mmol of acetic_acid + 10 mmol of NaCl", ""),
         (all, salty, "an ionic strength of 1.20 mol/kg"),
-        (all, "100 g of water + 10 mmol of ascorbic_acid", "leaves out what ascorbic_acid does"),
-        (WATER, "100 g of water + 10 mmol of Na2CO3", "leaves out what CO3^2- does"),
-        (acid, "100 g of water + 10 mmol of acetic_acid", "leaves out that water splits"),
-        (WATER, "100 g of water at 60 degC", "stands ready at 60 degC"),
+        (all, "100 g of water + 10 mmol of ascorbic_acid", "ignores ascorbic_acid:"),
+        (WATER, "100 g of water + 10 mmol of Na2CO3", "ignores CO3^2-:"),
+        (acid, "100 g of water + 10 mmol of acetic_acid", "ignores the dissociation of water"),
+        (WATER, "100 g of water at 60 degC", "is used at 60 degC"),
     ];
     for (equilibria, holding, why) in cases {
         write(&dir, "cup.mtx", cup(equilibria, holding, "    expect acidity(cup.contents) < 13\n"));

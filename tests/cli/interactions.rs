@@ -101,9 +101,9 @@ fn ions_without_numbers_are_warned_of() {
         (
             "use std::equilibria",
             "100 g of water + 10 mmol of NaCl",
-            "leaves out what Na+ and an ion of opposite charge",
+            "ignores the interaction of Na+ with an ion of opposite charge",
         ),
-        ("use std::brines", "100 g of water + 10 mmol of KI", "leaves out what K+"),
+        ("use std::brines", "100 g of water + 10 mmol of KI", "ignores the interaction of K+"),
         ("use std::brines", "100 g of water + 0.7 mol of HCl", "an ionic strength of 7.00 mol/kg"),
     ];
     for (items, holding, why) in cases {

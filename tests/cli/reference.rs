@@ -11,8 +11,9 @@ use crate::harness::{Ended, folder, matterixc_in, names, root, write};
 /// Pages whose `mtx` blocks run as tests.
 const PAGES: [&str; 5] = ["docs/language.md", "docs/library.md", "docs/devices.md", "docs/sila.md", "README.md"];
 
-/// The folder of pages whose `mtx` blocks also are in the style.
+/// Folders of pages whose `mtx` blocks also are in the style.
 const TUTORIAL: &str = "docs/tutorial";
+const COOKBOOK: &str = "docs/cookbook";
 
 /// A fenced block of a page.
 #[derive(Debug, PartialEq, Eq)]
@@ -55,14 +56,17 @@ fn codes(lines: &[serde_json::Value]) -> Vec<&str> {
     codes
 }
 
-/// Whether a block yields what its fence promises; in words if not.
-fn verify(name: &str, block: &Block, styled: bool) -> Result<(), String> {
+/// Whether a block yields what its fence promises; in words if not. A table of its page lies beside it as `data.csv`.
+fn verify(name: &str, block: &Block, table: Option<&str>, styled: bool) -> Result<(), String> {
     let fence = block.fence.as_str();
-    if matches!(fence, "text" | "sh" | "toml" | "json" | "ebnf") {
+    if matches!(fence, "text" | "sh" | "toml" | "json" | "csv" | "ebnf") {
         return Ok(());
     }
     let dir = folder(name);
     write(&dir, "example.mtx", &block.text);
+    if let Some(table) = table {
+        write(&dir, "data.csv", table);
+    }
     if styled && matterixc_in(&dir, &["fmt", "--check", "example.mtx"]).code != 0 {
         return Err("is not in the style of `matterixc fmt`".to_string());
     }
@@ -95,22 +99,31 @@ fn verify_pages(pages: &[String], styled: bool) {
     let mut wrong = Vec::new();
     for page in pages {
         let text = fs::read_to_string(root().join(page)).expect("the page can be read");
-        for block in blocks(&text) {
+        let all = blocks(&text);
+        let table = all.iter().find(|b| b.fence == "csv").map(|b| b.text.as_str());
+        for block in &all {
             let name = format!("reference_{}_{}", page.replace(['/', '.'], "_"), block.line);
-            let found = verify(&name, &block, styled).err();
+            let found = verify(&name, block, table, styled).err();
             wrong.extend(found.map(|e| format!("{page}:{}: `{}`: {e}", block.line, block.fence)));
         }
     }
     assert!(wrong.is_empty(), "{} blocks:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// The pages of the tutorial, by their paths from the top.
+/// The pages of a folder, by their paths from the top.
+fn pages_in(folder: &str) -> Vec<String> {
+    let pages = names(&root().join(folder)).into_iter().filter(|n| n.ends_with(".md"));
+    pages.map(|n| format!("{folder}/{n}")).collect()
+}
+
+/// The pages of the tutorial.
 pub fn tutorial() -> Vec<String> {
-    names(&root().join(TUTORIAL))
-        .into_iter()
-        .filter(|n| n.ends_with(".md"))
-        .map(|n| format!("{TUTORIAL}/{n}"))
-        .collect()
+    pages_in(TUTORIAL)
+}
+
+/// The pages of the cookbook.
+pub fn cookbook() -> Vec<String> {
+    pages_in(COOKBOOK)
 }
 
 #[test]
@@ -121,6 +134,11 @@ fn every_example_yields_what_its_fence_promises() {
 #[test]
 fn every_example_of_the_tutorial_yields_what_its_fence_promises() {
     verify_pages(&tutorial(), true);
+}
+
+#[test]
+fn every_recipe_yields_what_its_fence_promises() {
+    verify_pages(&cookbook(), true);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use crate::harness::{Ended, folder, matterixc, write};
+use crate::harness::{Ended, flat, folder, matterixc, matterixc_in, write};
 
 /// Mass fraction of a solute in water with g/mL and J/(g*K) at 25 degC: the equations of Laliberte, J. Chem. Eng. Data 54 (2009) 1725;
 /// H2SO4 of 98 %, ethanol and methanol Perry's Chemical Engineers' Handbook, and so the heat capacities of HCl and HNO3 (20 degC); those of
@@ -290,4 +290,88 @@ fn pouring_water_into_strong_acid_is_told_from_pouring_acid_into_water() {
     assert!(found.contains("water-into-acid"), "{found}");
     let found = told("c0", "c1");
     assert!(!found.contains("water-into-acid") && !found.contains("hot-mixing"), "{found}");
+}
+
+/// A cup of water into which portions of a salt go, with what is expected after each.
+fn portions(salt: &str, water: &str, steps: &[(&str, &str)]) -> String {
+    let steps: String = steps
+        .iter()
+        .map(|(mass, expected)| {
+            format!("    weigh_out {mass} from pellets into cup\n    expect cup.contents.temperature in {expected}\n")
+        })
+        .collect();
+    format!(
+        "mtx 1
+use std::glassware::Beaker250mL
+extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 ms
+    effect move(m, from: source, to: target)
+lab bench {{
+    ambient: 25 degC
+    pellets = Beaker250mL at (1, 0, 0) m holding 150 g of {salt}
+    cup = Beaker250mL at (2, 0, 0) m holding {water}
+}}
+workflow dissolve in bench {{
+{steps}}}
+"
+    )
+}
+
+#[test]
+fn beyond_saturation_a_salt_gives_the_heat_of_what_dissolves() {
+    let dir = folder("saturated");
+    let ran = |text: String| {
+        write(&dir, "cup.mtx", text);
+        let ran = matterixc_in(&dir, &["run", "cup.mtx", "--no-cache"]);
+        assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+        flat(&format!("{}{}", ran.out, ran.err))
+    };
+    // 20 g of water take up 20 g of NaOH; the 80 g beside them only take heat up.
+    let lye = [("20 g", "105 degC .. 115 degC"), ("80 g", "45 degC .. 60 degC")];
+    let said = ran(portions("NaOH", "20 g of water", &lye));
+    assert!(said.contains("heat-beyond-saturation"), "{said}");
+    // With equilibria the same.
+    ran(portions("NaOH", "20 g of water", &lye).replace("use std::glass", "use std::equilibria\nuse std::glass"));
+    // 20 g of water dissolve 7 g of KCl: beyond that nothing gets colder.
+    ran(portions("KCl", "20 g of water", &[("7 g", "5 degC .. 9 degC"), ("43 g", "7 degC .. 25 degC")]));
+    // What stays solid dissolves once there is enough water, and then all is as warm as if it had been there from the start.
+    let lab = "mtx 1
+use std::glassware::Beaker250mL
+extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 ms
+    effect move(m, from: source, to: target)
+lab bench {
+    ambient: 25 degC
+    pellets = Beaker250mL at (1, 0, 0) m holding 50 g of NaOH
+    water = Beaker250mL at (2, 0, 0) m holding 200 g of water
+    first = Beaker250mL at (3, 0, 0) m holding 10 g of water
+    second = Beaker250mL at (4, 0, 0) m holding 110 g of water
+}
+workflow dissolve in bench {
+    weigh_out 20 g from pellets into first
+    weigh_out 20 g from pellets into second
+    expect first.contents.temperature > 60 degC
+    weigh_out 100 g from water into first
+    expect first.contents.temperature - second.contents.temperature in -0.1 K .. 0.1 K
+}\n";
+    ran(lab.into());
+}
+
+#[test]
+fn what_is_not_known_of_volumes_and_heats_is_told() {
+    let dir = folder("not_known");
+    let said = |text: String| {
+        write(&dir, "cup.mtx", text);
+        flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out)
+    };
+    let soda = portions("Na2CO3", "100 g of water", &[("20 g", "20 degC .. 40 degC")]);
+    assert!(said(soda).contains("leaves out the heat of diluting CO3^2-"));
+    let little = said(portions("Na2CO3", "100 g of water", &[("2 g", "20 degC .. 40 degC")]));
+    assert!(little.contains("no findings"), "{little}");
+    let acetone = "mtx 1
+use std::glassware::Beaker250mL
+lab bench { ambient: 25 degC, cup = Beaker250mL at (0, 0, 0) m holding 50 g of water + 40 g of acetone }
+workflow look in bench { expect cup.contents.volume < 110 mL }\n";
+    assert!(said(acetone.into()).contains("sum of those of water and acetone"));
+    assert!(said(acetone.replace("acetone", "EtOH")).contains("no findings"));
 }

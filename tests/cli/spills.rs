@@ -188,11 +188,11 @@ fn pouring_nothing_or_less_and_pouring_from_an_empty_vessel_are_refused_in_words
         )
     };
     let cases = [
-        ("100 mL", pour("0 g"), "0 g are to be poured"),
-        ("100 mL", pour("-5 g"), "-5 g are to be poured"),
-        ("100 mL", tilt("0 g"), "0 g are to be poured"),
-        ("0 mL", pour("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
-        ("0 mL", tilt("5 g"), "`source` holds 0 g, and 5 g are to be poured"),
+        ("100 mL", pour("0 g"), "the amount to pour is 0 g"),
+        ("100 mL", pour("-5 g"), "the amount to pour is -5 g"),
+        ("100 mL", tilt("0 g"), "the amount to pour is 0 g"),
+        ("0 mL", pour("5 g"), "`source` holds 0 g, and this pours 5 g"),
+        ("0 mL", tilt("5 g"), "`source` holds 0 g, and this pours 5 g"),
     ];
     for (volume, steps, said) in cases {
         write(&dir, "bench.mtx", bench("", "Beaker250mL", volume, "", &steps).replace(" holding 0 mL of water", ""));
@@ -204,7 +204,7 @@ fn pouring_nothing_or_less_and_pouring_from_an_empty_vessel_are_refused_in_words
                  tilt source into target by panda { amount: left - left }\n    put back source by panda";
     write(&dir, "bench.mtx", bench("", "Beaker250mL", "100 mL", "", steps));
     let run = matterixc_in(&dir, &["run", "bench.mtx"]);
-    assert!(run.code != 0 && (run.out + &run.err).contains("0 g are to be poured"));
+    assert!(run.code != 0 && (run.out + &run.err).contains("the amount to pour is 0 g"));
 }
 
 #[test]

@@ -82,11 +82,6 @@ fn a_limit_is_a_share() {
         );
         write(&dir, "lab.mtx", text);
         let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
-        assert!(
-            ended.code == 1 && ended.out.contains("times the speed of `panda` is asked for"),
-            "{}{}",
-            ended.out,
-            ended.err
-        );
+        assert!(ended.code == 1 && ended.out.contains("`panda` cannot move at "), "{}{}", ended.out, ended.err);
     }
 }

@@ -96,6 +96,7 @@ codes! {
     NEVER_MADE "never-made" "K3" "something waits for or expects a substance that nothing makes";
     UNBALANCED "unbalanced" "K2" "atoms or charge differ between the sides of an equation";
     EQUILIBRIUM_FORM "equilibrium-form" "K2" "an equilibrium is not written as its constant is meant";
+    REACTION_AT_EQUILIBRIUM "reaction-at-equilibrium" "K2" "a reaction does what equilibria of the file do already";
     INTERACTION_FORM "interaction-form" "K2" "an interaction is not between what is dissolved, or its numbers are not those of its charges";
     EQUILIBRIA_CONTRADICT "equilibria-contradict" "K2" "the constants of a circle of equilibria do not agree";
     FORMULA_INVALID "formula-invalid" "K2" "a formula, structure or molar mass is wrong";
@@ -117,6 +118,9 @@ codes! {
     SECOND_PHASE "second-phase" "H3" "more of an organic liquid or solid is in water than dissolves";
     GAS_STAYS "gas-stays" "H3" "a gas leaves that the model keeps dissolved";
     GAS_LEAVES "gas-leaves" "H3" "more of a gas is there than stays dissolved";
+    GAS_BUBBLES_OFF "gas-bubbles-off" "H3" "an open vessel holds gases at more than the pressure of the air";
+    PH_OUT_OF_WINDOW "ph-out-of-window" "D1" "the pH of a vessel leaves the window that is given for it";
+    HEAT_BEYOND_SATURATION "heat-beyond-saturation" "H3" "a temperature is used of a mixture with too little water for its salts";
     PH_FAR_FROM_25_DEGC "ph-far-from-25-degc" "H3" "the pH of a warm or cold solution is used";
     HEAT_OF_STRONG_SOLUTION "heat-of-strong-solution" "H3" "the temperature of a concentrated solution is used whose heat capacity is unknown";
     VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution is measured out by volume whose density is unknown";

@@ -106,6 +106,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             for (index, r) in lab.tables.reactions.iter().enumerate() {
                 if r.module == module && r.name.trim_end_matches(".reverse") == name.text {
                     lab.check_rate(crate::declare::ReactionId(index as u32));
+                    lab.check_at_rest(crate::declare::ReactionId(index as u32));
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! The table of equilibria, and the checks that need no lab: balance, and what constants are of.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::SpeciesId;
@@ -65,7 +67,13 @@ pub fn collect<'a>(
     let is_equilibrium = |decl: &&crate::names::Decl<'a>| matches!(decl.item.kind, ItemKind::Equilibrium { .. });
     // Those of the library hold where a file asks for them.
     let used = if names.decls.iter().any(|decl| is_equilibrium(&decl)) { used(names.modules) } else { Vec::new() };
-    for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true)) {
+    let is_library = |decl: &crate::names::Decl<'a>| names.modules[decl.module].is_library();
+    let own: BTreeSet<&str> =
+        names.decls.iter().filter(is_equilibrium).filter(|d| !is_library(d)).filter_map(name_of).collect();
+    // One of the file's own takes the place of the library's.
+    let is_replaced =
+        |decl: &&crate::names::Decl<'a>| is_library(decl) && name_of(decl).is_some_and(|name| own.contains(name));
+    for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true) && !is_replaced(decl)) {
         let ItemKind::Equilibrium { name, reactants, products, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "an equilibrium", diagnostics);
         let Some((left, right)) = species.sides(names, decl.module, (reactants, products), diagnostics) else {
@@ -99,6 +107,14 @@ pub fn collect<'a>(
         out.push(EquilibriumDef { name, module: decl.module, terms, solids, gas, fields, equation, span });
     }
     out
+}
+
+/// The name of an equilibrium.
+fn name_of<'n>(decl: &'n crate::names::Decl<'_>) -> Option<&'n str> {
+    match &decl.item.kind {
+        ItemKind::Equilibrium { name, .. } => Some(&name.text),
+        _ => None,
+    }
 }
 
 /// One of the fields gives its constant.

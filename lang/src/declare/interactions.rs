@@ -109,8 +109,11 @@ pub fn collect<'a>(
         let charge = |s: &SpeciesId| species.get(*s).formula.as_ref().map_or(0, |f| f.charge);
         let members: Vec<SpeciesId> = members.into_iter().map(|(s, _)| s).collect();
         let charges: Vec<i32> = members.iter().map(charge).collect();
-        let Some(kind) = Kind::of(&charges) else {
-            let headline = format!("`{}` is between two species, or three with both signs of charge", name.text);
+        let has_twice = (1..members.len()).any(|k| members[..k].contains(&members[k]));
+        let is_self = has_twice && charges.iter().any(|z| *z != 0);
+        let Some(kind) = Kind::of(&charges).filter(|_| !is_self && (!has_twice || members.len() == 2)) else {
+            let headline =
+                format!("`{}` is between two different species, or three with both signs of charge", name.text);
             let help = "write `Na+ + Cl-`, `Na+ + K+`, `CO2 + Na+`, `Na+ + K+ + Cl-` or `CO2 + Na+ + Cl-`";
             diagnostics.push(refused(headline, "not of that form", help));
             continue;

@@ -3,10 +3,11 @@
 use matterix_ir::Span;
 use matterix_ir::quantity::show_number;
 
-use crate::ast::{ExprKind, Field, FieldValue, ItemKind};
+use crate::ast::{Expr, ExprKind, Field, FieldValue, ItemKind};
 use crate::declare::SpeciesId;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::substances::Substance;
+use crate::eval::{Scope, Value};
 use crate::units::Dimension;
 
 /// How many times more or less of a line is looked for.
@@ -69,16 +70,33 @@ impl<'a> Elaborator<'a> {
                 None => Some(plus(whole, &own, more).into_iter().map(|(s, n)| (s, n / (1.0 + more))).collect()),
             }
         };
-        let factor = self.factor(times, s, measure, stated)?;
-        let text = show_number(format!("{:.3e}", number * factor).parse().ok()?);
+        let share_factor = self.factor(&times, s, measure, stated)?;
+        let factor = self.of_volume(e, module, |lab, per| {
+            let mended = lab.concentration_of(&times(share_factor)?, s, per)?;
+            Some(mended / lab.concentration_of(whole, s, per)?)
+        });
+        let text = show_number(format!("{:.3e}", number * factor.unwrap_or(share_factor)).parse().ok()?);
         let text = if unit.text.is_empty() { text } else { format!("{text} {}", unit.text) };
         Some(Amount { at: e.span, text, of: field.key.text.clone() })
+    }
+
+    /// Something of the amount of a line that is written per volume, as `58.44 g/L` is: a line of a stronger solution makes up another share
+    /// of its mass. None for other amounts.
+    fn of_volume(
+        &mut self,
+        amount: &'a Expr,
+        module: usize,
+        mut of: impl FnMut(&mut Self, &Dimension) -> Option<f64>,
+    ) -> Option<f64> {
+        let Value::Num(n) = self.expr(amount, &mut Scope::module(module)) else { return None };
+        let per_volume = ["MassConcentration", "AmountConcentration"].map(|name| self.tables.units.named(name));
+        per_volume.contains(&n.dimension).then(|| of(self, &n.dimension)).flatten()
     }
 
     /// With how many times the amount of a line a recipe has a concentration; none where no amount comes near it.
     fn factor(
         &mut self,
-        times: impl Fn(f64) -> Option<Parts>,
+        times: &impl Fn(f64) -> Option<Parts>,
         s: SpeciesId,
         measure: &Dimension,
         stated: f64,

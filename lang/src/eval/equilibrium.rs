@@ -14,7 +14,7 @@ use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
 use crate::declare::equilibria::{ANALYTIC, CONSTANTS, POTENTIAL};
 use crate::declare::species::field;
-use crate::declare::{SpeciesId, Type};
+use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::interactions::Acting;
 use crate::eval::lab::{Elaborator, Mode};
 use crate::names::DeclId;
@@ -560,14 +560,7 @@ impl<'a> Elaborator<'a> {
 
     /// The circles of all equilibria of the file.
     fn all_circles(&self) -> Result<Vec<Circle>, Unsettled> {
-        // A gas stands in one equation alone.
-        let is_dissolved = |e: &usize| self.tables.equilibria[*e].gas.is_none();
-        let all: Vec<usize> = (0..self.tables.equilibria.len()).filter(is_dissolved).collect();
-        let water = self.tables.species.iter().map(|(s, _)| s).find(|s| self.tables.species.get(*s).is_water);
-        let mut members: Vec<SpeciesId> = water.into_iter().collect();
-        let mut known: BTreeSet<SpeciesId> = members.iter().copied().collect();
-        let terms = all.iter().flat_map(|e| self.tables.equilibria[*e].terms.iter().map(|(s, _)| *s));
-        members.extend(terms.filter(|s| known.insert(*s)));
+        let (all, members) = self.solved_together();
         let system = System::try_from(self.written_system(&members, &all))?;
         let of_all = |circle: &Circle| {
             let mut factors = vec![0.0; self.tables.equilibria.len()];
@@ -575,6 +568,42 @@ impl<'a> Elaborator<'a> {
             Circle { factors }
         };
         Ok(system.circles().iter().map(of_all).collect())
+    }
+
+    /// All equilibria of the file but those of gases, each of which stands in one equation alone; and their species, water first.
+    fn solved_together(&self) -> (Vec<usize>, Vec<SpeciesId>) {
+        let is_dissolved = |e: &usize| self.tables.equilibria[*e].gas.is_none();
+        let all: Vec<usize> = (0..self.tables.equilibria.len()).filter(is_dissolved).collect();
+        let water = self.tables.species.iter().map(|(s, _)| s).find(|s| self.tables.species.get(*s).is_water);
+        let mut members: Vec<SpeciesId> = water.into_iter().collect();
+        let mut known: BTreeSet<SpeciesId> = members.iter().copied().collect();
+        let terms = all.iter().flat_map(|e| self.tables.equilibria[*e].terms.iter().map(|(s, _)| *s));
+        members.extend(terms.filter(|s| known.insert(*s)));
+        (all, members)
+    }
+
+    /// A reaction that equilibria of the file make up is at rest at every moment: whatever its rate says, it would give off heat for ever.
+    pub fn check_at_rest(&mut self, reaction: ReactionId) {
+        let def = &self.tables.reactions[reaction.0 as usize];
+        let mut net: BTreeMap<SpeciesId, f64> = BTreeMap::new();
+        def.products.iter().for_each(|(s, n)| *net.entry(*s).or_default() += n);
+        def.reactants.iter().for_each(|(s, n)| *net.entry(*s).or_default() -= n);
+        net.retain(|_, n| *n != 0.0);
+        let (all, members) = self.solved_together();
+        if def.reverse || net.is_empty() || net.keys().any(|s| !members.contains(s)) {
+            return;
+        }
+        let mut written = self.written_system(&members, &all);
+        let coefficients = members.iter().map(|s| net.get(s).copied().unwrap_or(0.0)).collect();
+        written.equations.push(Equation { name: def.name.clone(), coefficients });
+        let Ok(system) = System::try_from(written) else { return };
+        let is_of_it = |circle: &&Circle| circle.factors.last().is_some_and(|f| f.abs() > NO_PART);
+        let Some(circle) = system.circles().iter().find(is_of_it) else { return };
+        let part = all.iter().zip(&circle.factors).filter(|(_, f)| f.abs() > NO_PART);
+        let names: Vec<String> = part.map(|(e, _)| format!("`{}`", self.tables.equilibria[*e].name)).collect();
+        let headline = format!("`{}` is at equilibrium at every moment, by {}", def.name, joined(&names, "and"));
+        let d = Diagnostic::error(codes::REACTION_AT_EQUILIBRIUM, def.span, headline, "would never come to rest");
+        self.report(d.help("leave the reaction out, or the equilibria if it is the slow step that you want to follow"));
     }
 
     fn check_circle(&mut self, factors: &[f64]) {
@@ -603,7 +632,17 @@ impl<'a> Elaborator<'a> {
             let other = &self.tables.equilibria[*e];
             d = d.because(other.equation, format!("`{}` is one of the others", other.name));
         }
-        self.report(d.help("leave out one of them: it follows from the rest"));
+        // One of the library gives way to one of the file with its name.
+        let is_library = |e: &usize| self.tables.names.modules[self.tables.equilibria[*e].module].is_library();
+        let theirs = part.iter().map(|(e, _)| *e).find(is_library);
+        let help = match theirs.filter(|_| part.iter().any(|(e, _)| !is_library(e))) {
+            Some(e) => format!(
+                "leave out one of them: it follows from the rest; yours takes the place of the library's if you call it `{}`",
+                self.tables.equilibria[e].name
+            ),
+            None => "leave out one of them: it follows from the rest".to_owned(),
+        };
+        self.report(d.help(help));
     }
 
     /// Whether a salt, acid or base splits by itself: one in an equilibrium dissolves by that.
@@ -717,11 +756,14 @@ impl<'a> Elaborator<'a> {
         self.graph.binary(BinaryOp::And, above, below)
     }
 
-    /// Whether all equilibria of a mixture have constants at a temperature.
-    pub fn equilibria_hold(&mut self, id: InstanceId, temperature: NodeId) -> NodeId {
+    /// Whether all equilibria of a mixture, or those that have a species, have constants at a temperature.
+    pub fn equilibria_hold(&mut self, id: InstanceId, of: Option<SpeciesId>, temperature: NodeId) -> NodeId {
         let mut holds = self.graph.number(1.0);
         let Some(speciation) = self.speciation(id) else { return holds };
         for e in speciation.equilibria.iter().copied() {
+            if of.is_some_and(|s| !self.tables.equilibria[e].involves(s)) {
+                continue;
+            }
             let Some(window) = self.window_of(e) else { continue };
             let within = self.within(window, temperature);
             holds = self.graph.binary(BinaryOp::And, holds, within);

@@ -98,6 +98,8 @@ enum Bound {
     IonicStrength,
     /// Whether equilibria have constants at a temperature.
     EquilibriaHold,
+    /// Whether those that have a species do.
+    ConstantsHold,
     /// The heat of coming to equilibrium at the start.
     HeatAtStart,
     /// The activity that a gas has where it is at rest with a mixture.
@@ -131,6 +133,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("settled_temperature", Bound::Settled),
     ("settled_strength", Bound::IonicStrength),
     ("equilibria_hold", Bound::EquilibriaHold),
+    ("constants_hold", Bound::ConstantsHold),
     ("heat_at_start", Bound::HeatAtStart),
     ("gas_activity", Bound::GasActivity),
     ("gases", Bound::Gases),
@@ -347,7 +350,10 @@ impl Elaborator<'_> {
                 Value::Num(Num { node, literal: false, ..otherwise.clone() })
             }
             (Bound::EquilibriaHold, [Value::Instance(m), Value::Num(t)]) => {
-                Value::Bool(self.equilibria_hold(*m, t.node))
+                Value::Bool(self.equilibria_hold(*m, None, t.node))
+            }
+            (Bound::ConstantsHold, [Value::Instance(m), Value::Species(s), Value::Num(t)]) => {
+                Value::Bool(self.equilibria_hold(*m, Some(*s), t.node))
             }
             (Bound::HeatAtStart, [Value::Instance(m), Value::Num(t)]) => {
                 let node = self.heat_at_start(*m, t.node);

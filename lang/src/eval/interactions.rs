@@ -150,8 +150,14 @@ impl<'a> Elaborator<'a> {
         if let Some(given) = expr_of(fields, REACH) {
             let v = self.expr(given, &mut Scope::module(module));
             let list = self.coerce(v, &Type::List(Type::ratio().into()), given.span, REACH);
-            if matches!(&list, Value::List(numbers) if numbers.len() != 2) {
-                let d = Diagnostic::error(codes::INTERACTION_FORM, given.span, "`reach` has two numbers", "not two");
+            let Value::List(numbers) = &list else { return };
+            let above = numbers.iter().all(|n| {
+                let node = self.value_node(n);
+                node.and_then(|node| self.glance(node)).is_some_and(|v| v.is_finite() && v > 0.0)
+            });
+            if numbers.len() != 2 || !above {
+                let headline = "`reach` has two numbers above 0";
+                let d = Diagnostic::error(codes::INTERACTION_FORM, given.span, headline, "not so");
                 self.report(d.help("`reach: [2, 12]` for the numbers `b1` and `b2`"));
             }
         }

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::inventory::Substance;
+use matterix_ir::model::Content;
 use matterix_ir::scene::{Instance, InstanceId};
 use matterix_ir::{Env, NodeId};
 
 use super::list::{List, Step, table};
 use super::{Prose, words};
+use crate::declare::SpeciesId;
 use matterix_ir::listing::joined;
 
 impl Prose<'_, '_> {
@@ -42,9 +44,38 @@ impl Prose<'_, '_> {
 
     /// A value that rests on parameters only.
     fn at_first(&self, node: NodeId) -> f64 {
+        self.with(&[], node)
+    }
+
+    /// A value where states are these.
+    fn with(&self, states: &[f64], node: NodeId) -> f64 {
         let model = &self.program.model;
         let params: Vec<f64> = model.params.iter().map(|p| p.value).collect();
-        model.graph.eval(node, Env { time: 0.0, states: &[], params: &params, locals: &[], readings: &[] })
+        model.graph.eval(node, Env { time: 0.0, states, params: &params, locals: &[], readings: &[] })
+    }
+
+    /// The pH of a mixture once its salts have dissolved, where equilibria give it one.
+    fn ph_at_first(&self, mixture: u32) -> Option<f64> {
+        let model = &self.program.model;
+        let of = model.mixtures.get(mixture as usize)?;
+        let shown = of.properties.iter().filter_map(|i| model.observables.get(*i as usize));
+        let node = *shown.into_iter().find(|o| o.name.ends_with(".ph"))?.value.first()?;
+        let mut states: Vec<f64> = model.states.iter().map(|s| self.at_first(s.initial)).collect();
+        let species = &self.lab.tables.species;
+        let place = |s: SpeciesId| of.contents.iter().find(|c| c.species == s.0).map(|c| c.state as usize);
+        let is_water = |c: &&Content| species.get(SpeciesId(c.species)).is_water;
+        let water = of.contents.iter().find(is_water)?.state as usize;
+        for content in of.contents.iter().filter(|c| self.lab.splits(SpeciesId(c.species))) {
+            let amount = states[content.state as usize];
+            if states[water] <= 0.0 || amount == 0.0 {
+                continue;
+            }
+            states[content.state as usize] = 0.0;
+            for (ion, count) in &species.get(SpeciesId(content.species)).dissolves {
+                states[place(*ion)?] += count * amount;
+            }
+        }
+        Some(self.with(&states, node)).filter(|ph| ph.is_finite())
     }
 
     fn instance(&self, id: InstanceId) -> &Instance {
@@ -187,7 +218,7 @@ impl Prose<'_, '_> {
 
     /// Vessels are filled.
     fn setting_up(&self, held: &[(f64, f64)]) -> List {
-        let mut fills: Vec<(Vec<String>, String, String)> = Vec::new();
+        let mut fills: Vec<(Vec<String>, (String, String), String)> = Vec::new();
         let stock = &self.program.inventory;
         for mixture in 0..self.program.model.mixtures.len() as u32 {
             let terms = stock.holdings.iter().zip(held).filter(|(h, _)| h.mixture == mixture);
@@ -200,9 +231,10 @@ impl Prose<'_, '_> {
             let Some((first, _)) = terms.clone().next() else { continue };
             let warm = first.start.as_ref().map(|(node, unit)| words::quantity(&unit.show(self.at_first(*node))));
             let warm = warm.map(|t| format!(" at {t}")).unwrap_or_default();
+            let ph = self.ph_at_first(mixture).map(|ph| format!(" Its pH is {ph:.2}.")).unwrap_or_default();
             let (vessel, what, place) = (
                 self.instance(self.holder(mixture)).name.clone(),
-                format!("{}{warm}", joined(&texts, "and")),
+                (format!("{}{warm}", joined(&texts, "and")), ph),
                 self.place(first.span),
             );
             match fills.last_mut() {
@@ -210,13 +242,13 @@ impl Prose<'_, '_> {
                 _ => fills.push((vec![vessel], what, place)),
             }
         }
-        let steps = fills.into_iter().map(|(vessels, what, place)| {
+        let steps = fills.into_iter().map(|(vessels, (what, ph), place)| {
             let each = if vessels.len() > 1 { "each of " } else { "" };
             let names: Vec<String> = match vessels.as_slice() {
                 [first, .., last] if vessels.len() > 4 => vec![format!("**{first}** to **{last}**")],
                 all => all.iter().map(|v| format!("**{v}**")).collect(),
             };
-            Step::new(format!("Put {what} into {each}{}. {place}", joined(&names, "and")))
+            Step::new(format!("Put {what} into {each}{}.{ph} {place}", joined(&names, "and")))
         });
         List { steps: steps.collect(), ..List::default() }
     }

@@ -1,13 +1,14 @@
-//! What the tutorial and the chapter on devices say that a command prints is what it prints.
+//! What the tutorial, the cookbook and the chapter on devices say that a command prints is what it prints.
 //!
 //! A `sh` block of one command with a `text` block right below it is run, with the nearest `mtx` block above as the file it
-//! names and a `toml` block as `lab.toml`. A line `...` stands for any number of lines. `MATTERIX_UPDATE` writes those without one.
+//! names, a `toml` block as `lab.toml` and a `csv` block as `data.csv`. A line `...` stands for any number of lines.
+//! `MATTERIX_UPDATE` writes those without one.
 
 use std::fs;
 use std::path::Path;
 
 use crate::harness::{folder, matterixc_in, root, write};
-use crate::reference::{Block, blocks, tutorial};
+use crate::reference::{Block, blocks, cookbook, tutorial};
 
 /// The words of a command line; those in quotes are one.
 fn words(command: &str) -> Vec<String> {
@@ -57,7 +58,7 @@ fn follows(above: &Block, below: &Block) -> bool {
 fn what_commands_are_said_to_print_is_what_they_print() {
     let update = std::env::var_os("MATTERIX_UPDATE").is_some();
     let mut wrong = Vec::new();
-    for page in tutorial().into_iter().chain(["docs/devices.md".to_string()]) {
+    for page in tutorial().into_iter().chain(cookbook()).chain(["docs/devices.md".to_string()]) {
         let text = fs::read_to_string(root().join(&page)).expect("the page can be read");
         let all = blocks(&text);
         let dir = folder(&format!("outputs_{}", page.replace(['/', '.'], "_")));
@@ -65,6 +66,7 @@ fn what_commands_are_said_to_print_is_what_they_print() {
         for (index, block) in all.iter().enumerate() {
             match block.fence.as_str() {
                 "toml" => drop(write(&dir, "lab.toml", &block.text)),
+                "csv" => drop(write(&dir, "data.csv", &block.text)),
                 fence if fence.starts_with("mtx") => file = Some(block.text.as_str()),
                 "sh" => {
                     let Some(below) = all.get(index + 1).filter(|b| b.fence == "text" && follows(block, b)) else {

@@ -1,11 +1,7 @@
 //! Activity coefficients of what is dissolved, by ionic strength and temperature.
 
 use super::Layout;
-use super::pitzer::At;
 use super::solve::{LN_10, STANDARD};
-
-/// An ionic strength below this, mol/kg, changes nothing.
-const LEAST: f64 = 1e-16;
 
 /// What all coefficients of a mixture follow: `A = a0 + a1 t + a2 t^2` and `B = b0 + b1 t` with `t = T - 298.15 K`. Above an ionic
 /// strength of `most`, in mol/kg, coefficients are those at `most`. Each mol/kg of what is dissolved lowers the logarithm of the activity
@@ -66,17 +62,10 @@ pub(super) struct Around {
     /// Ionic strength that counts, and its root.
     strength: f64,
     root: f64,
-    a: f64,
+    pub(super) a: f64,
     b: f64,
     /// How A and B grow with temperature.
     pub(super) rises: [f64; 2],
-}
-
-impl Around {
-    /// Where interactions are: molalities are still to be said.
-    pub(super) fn at(&self) -> At<'static> {
-        At { a: self.a, strength: self.strength.max(LEAST), molalities: &[] }
-    }
 }
 
 impl Coefficients {

@@ -14,8 +14,8 @@
 //!
 //! with `C = C0 / (2 sqrt |z z|)`, `h(x) = 2 (1 - (1 + x) exp(-x)) / x^2`, and E what electrostatics adds between different charges
 //! (`mixing`). Then `ln gamma_i = dg/dm_i + z_i^2 / 2 dg/dI`, and the logarithm of the activity of the solvent is that of a dilute solution
-//! with `W = sum of m_i dg/dm_i + I dg/dI - g` added to the molality of all. The ionic strength and each molality are unknowns of their own,
-//! so that everything here is explicit.
+//! with `W = sum of m_i dg/dm_i + I dg/dI - g` added to the molality of all. Each molality is an unknown of its own, so that everything
+//! here is explicit; the ionic strength is that of these molalities, for the law makes no sense with another one.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,9 @@ use super::linear::Matrix;
 use super::solve::LN_10;
 use super::{Phase, Written, mixing};
 use crate::math;
+
+/// An ionic strength below this, mol/kg, changes nothing.
+const LEAST: f64 = 1e-16;
 
 /// What two or three dissolved members do to each other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -89,14 +92,13 @@ pub(super) struct Virial {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Effects {
     pub(super) ln: Vec<f64>,
-    pub(super) by_strength: Vec<f64>,
     /// By the molality of each.
     pub(super) by: Matrix,
     /// What is added to the molality of all in the activity of the solvent, mol/kg.
     pub(super) osmotic: f64,
-    pub(super) osmotic_by_strength: f64,
     pub(super) osmotic_by: Vec<f64>,
-    by_strength_alone: Vec<f64>,
+    /// How the derivatives of g by molalities grow with ionic strength.
+    by_strength: Vec<f64>,
 }
 
 /// How they move along a direction of the numbers and of A, all else the same.
@@ -106,12 +108,12 @@ pub(super) struct Turn {
     pub(super) osmotic: f64,
 }
 
-/// Where a mixture is: A of log10, ionic strength, and molalities of placed members.
+/// Where a mixture is: A of log10, molalities of placed members, and their ionic strength.
 #[derive(Clone, Copy)]
 pub(super) struct At<'a> {
-    pub(super) a: f64,
-    pub(super) strength: f64,
-    pub(super) molalities: &'a [f64],
+    a: f64,
+    strength: f64,
+    molalities: &'a [f64],
 }
 
 impl At<'_> {
@@ -166,7 +168,13 @@ impl Virial {
         self.place_of[member]
     }
 
-    /// Coefficients and how they move with ionic strength and molalities.
+    /// Where a mixture is, by A and molalities.
+    pub(super) fn at<'m>(&self, a: f64, molalities: &'m [f64]) -> At<'m> {
+        let strength: f64 = molalities.iter().zip(&self.charges).map(|(m, z)| 0.5 * m * z * z).sum();
+        At { a, strength: strength.max(LEAST), molalities }
+    }
+
+    /// Coefficients and how they move with molalities.
     pub(super) fn effects(&self, at: At<'_>, numbers: &[f64], to: &mut Effects) {
         let (count, m) = (self.placed.len(), at.molalities);
         to.clear(count);
@@ -235,17 +243,17 @@ impl Virial {
         // Up to here all of it is of g by molalities alone.
         let along: f64 = m.iter().zip(&to.ln).map(|(m, of)| m * of).sum();
         to.osmotic = along + at.strength * by_i - g;
-        to.osmotic_by_strength = m.iter().zip(&to.by_strength).map(|(m, of)| m * of).sum::<f64>() + at.strength * by_i2;
-        to.osmotic_by = (0..count)
-            .map(|j| (0..count).map(|i| m[i] * *to.by.at(i, j)).sum::<f64>() + at.strength * to.by_strength[j])
-            .collect();
-        to.by_strength_alone.clone_from(&to.by_strength);
+        let half = |i: usize| 0.5 * self.charges[i] * self.charges[i];
+        let osmotic_by_i = m.iter().zip(&to.by_strength).map(|(m, of)| m * of).sum::<f64>() + at.strength * by_i2;
+        to.osmotic_by.clear();
+        for j in 0..count {
+            let along: f64 = (0..count).map(|i| m[i] * *to.by.at(i, j)).sum();
+            to.osmotic_by.push(along + at.strength * to.by_strength[j] + half(j) * osmotic_by_i);
+        }
         for i in 0..count {
-            let half = 0.5 * self.charges[i] * self.charges[i];
-            to.ln[i] += half * by_i;
-            to.by_strength[i] += half * by_i2;
+            to.ln[i] += half(i) * by_i;
             for j in 0..count {
-                *to.by.at(i, j) += half * to.by_strength_alone[j];
+                *to.by.at(i, j) += half(i) * to.by_strength[j] + half(j) * (to.by_strength[i] + half(i) * by_i2);
             }
         }
     }

@@ -10,7 +10,7 @@ use super::{Layout, System};
 use crate::math;
 
 /// A total below this, in mol per kg of solvent, counts as none: its members are followed linearly from there to nothing and below.
-const TRACE: f64 = 1e-30;
+pub(super) const TRACE: f64 = 1e-30;
 
 /// The logarithm of an activity of which nothing is known.
 const NEUTRAL: f64 = -16.0;

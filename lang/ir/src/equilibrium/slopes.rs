@@ -2,7 +2,7 @@
 
 use super::basis::Basis;
 use super::linear::Factors;
-use super::pitzer::{At, Turn, Virial};
+use super::pitzer::{Turn, Virial};
 use super::problem::Problem;
 use super::solve::{Point, STANDARD, Solution, terms};
 use super::{Part, Phase, Role, System};
@@ -82,7 +82,7 @@ fn beside(problem: &Problem<'_>, point: &Point, arg: usize) -> (Vec<f64>, Vec<f6
         let of = |i: usize| virial.place(i).map_or(0.0, |k| turn.ln[k]);
         ((0..count).map(|i| raised[i] - of(i)).collect(), raised)
     };
-    let at = At { molalities: &point.x[places.placed()], ..around.at() };
+    let at = |virial: &Virial| virial.at(around.a, &point.x[places.placed()]);
     match (problem.layout.role(arg), problem.system.virial.as_deref()) {
         (Role::Activities(LOWERING), _) => {
             let molality = point.x[places.molality()] + point.state.effects.osmotic;
@@ -90,10 +90,10 @@ fn beside(problem: &Problem<'_>, point: &Point, arg: usize) -> (Vec<f64>, Vec<f6
         }
         (Role::Activities(which @ 0..3), Some(virial)) => {
             let by = (temperature - STANDARD).powi(which as i32);
-            by_turn(virial, virial.turn(at, &vec![0.0; virial.count()], by))
+            by_turn(virial, virial.turn(at(virial), &vec![0.0; virial.count()], by))
         }
         (Role::Interaction(number, term), Some(virial)) => {
-            by_turn(virial, virial.turn_by(at, number, terms(temperature)[term]))
+            by_turn(virial, virial.turn_by(at(virial), number, terms(temperature)[term]))
         }
         (Role::Activities(which), None) => less(&|i| match is_solute(i) {
             true => {

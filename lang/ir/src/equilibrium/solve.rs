@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::basis::Basis;
 use super::formal::Begin;
 use super::linear::{Factors, Matrix};
-use super::problem::{Problem, TEMPERATURES, Totals};
+use super::problem::{Problem, TEMPERATURES, TRACE, Totals};
 use super::state::State;
 use super::{Layout, System, formal, memo};
 use crate::math;
@@ -25,6 +25,9 @@ const KEPT: f64 = 1e-9;
 
 /// How often a temperature is halved that is hard to find.
 const HALVINGS: usize = 40;
+
+/// So far apart are temperatures that are tried one after the other, K.
+const WALK: f64 = 10.0;
 
 /// A solid is above its constant by this much of a logarithm before it counts.
 const SATURATED: f64 = 1e-10;
@@ -129,6 +132,26 @@ fn may_hold(free: &Problem<'_>) -> bool {
     below(low) && above(high)
 }
 
+/// Two temperatures between which the heat content lies, a step apart, found from that of reference on: constants make sense near it, and
+/// may make none at the ends. None where a solution is lacking on the way.
+fn around_heat(free: &Problem<'_>) -> Option<(f64, f64)> {
+    let wanted = free.args[free.layout.heat()];
+    let (lowest, highest) = TEMPERATURES;
+    let mut here = free.reference().clamp(lowest, highest);
+    let is_below = |t: f64| Some(held_at(free, t)?.0 < wanted);
+    let up = is_below(here)?;
+    loop {
+        let next = (here + if up { WALK } else { -WALK }).clamp(lowest, highest);
+        if next == here {
+            return None;
+        }
+        if is_below(next)? != up {
+            return Some((here.min(next), here.max(next)));
+        }
+        here = next;
+    }
+}
+
 /// The heat content that a temperature makes, J, with the solution there.
 fn held_at(free: &Problem<'_>, temperature: f64) -> Option<(f64, Solution)> {
     let layout = free.layout;
@@ -146,7 +169,7 @@ fn by_temperature(free: &Problem<'_>, lacking: &[f64]) -> Option<Solution> {
     if free.is_isothermal() {
         return None;
     }
-    let (mut low, mut high) = TEMPERATURES;
+    let (mut low, mut high) = around_heat(free).unwrap_or(TEMPERATURES);
     let mut last = None;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -289,7 +312,9 @@ fn keeps_all(problem: &Problem<'_>, solution: &Solution) -> bool {
             *size = size.max((part * amount).abs()).max((part * given).abs());
         }
     }
-    rows.iter().all(|(gap, size)| gap.abs() <= KEPT * size + f64::MIN_POSITIVE)
+    // Where a formal member is held, nothing balances the last traces of what would take it up.
+    let trace = TRACE * solution.amounts[free.water] * problem.system.written.solvent_mass;
+    rows.iter().all(|(gap, size)| gap.abs() <= KEPT * size + trace)
 }
 
 enum Change {

@@ -2,7 +2,7 @@
 
 use super::activity::{Around, Coefficient};
 use super::linear::Matrix;
-use super::pitzer::{At, Effects, Turn, Virial};
+use super::pitzer::{Effects, Turn, Virial};
 use super::problem::{Problem, Totals};
 use super::{Layout, Phase, rises, terms};
 use crate::math;
@@ -102,7 +102,7 @@ impl Problem<'_> {
 
     /// What interactions make of coefficients.
     fn interact(&self, virial: &Virial, around: &Around, x: &[f64], state: &mut State) {
-        let at = At { molalities: &x[self.places().placed()], ..around.at() };
+        let at = virial.at(around.a, &x[self.places().placed()]);
         virial.effects(at, &state.numbers, &mut state.effects);
         state.warming = virial.turn(at, &state.number_rises, around.rises[0]);
     }
@@ -224,7 +224,7 @@ impl Problem<'_> {
     pub(super) fn activity_by(&self, member: usize, state: &State, to: &mut [f64]) {
         let (dryness, effects) = (self.dryness(member), &state.effects);
         let last = to.len() - 1;
-        to[..3].copy_from_slice(&[0.0, dryness * effects.osmotic_by_strength, dryness]);
+        to[..3].copy_from_slice(&[0.0, 0.0, dryness]);
         to[3..last].iter_mut().zip(&effects.osmotic_by).for_each(|(to, by)| *to = dryness * by);
         to[last] = state.rises[member] + dryness * state.warming.osmotic;
     }
@@ -334,8 +334,7 @@ impl Problem<'_> {
 impl State {
     /// The coefficient of a placed member.
     fn interacting(&self, k: usize) -> Coefficient {
-        let Effects { ln, by_strength, .. } = &self.effects;
-        Coefficient { ln: ln[k], by_strength: by_strength[k], by_warmth: self.warming.ln[k] }
+        Coefficient { ln: self.effects.ln[k], by_strength: 0.0, by_warmth: self.warming.ln[k] }
     }
 
     /// How far above the reference temperature the heat that is there brings it.

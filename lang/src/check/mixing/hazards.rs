@@ -14,6 +14,9 @@ use super::state::MixtureState;
 use super::uses::Stream;
 use crate::elaborate::hazards::{Hazard, Watched};
 
+/// Of so many things the same is told at one place.
+const MOST_THINGS: usize = 3;
+
 /// The hazards of a lab, by the states they depend on.
 pub(super) struct Hazards {
     pub all: Arc<[Hazard]>,
@@ -24,8 +27,8 @@ pub(super) struct Hazards {
     standing: BTreeMap<usize, Span>,
     /// Those of transfers that have come about, with what is said of them where a value is used.
     since: BTreeMap<usize, (Span, String)>,
-    /// Places, and the hazards of values and transfers told there: one mistake is one message.
-    told: BTreeSet<(Span, Span)>,
+    /// By place and hazard of values and transfers: those of its combinations of things that were told there.
+    told: BTreeMap<(Span, Span), Vec<usize>>,
 }
 
 impl Hazards {
@@ -36,7 +39,7 @@ impl Hazards {
                 by_state.entry(*s).or_default().push(i);
             }
         }
-        let (present, standing, since, told) = (BTreeSet::new(), BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+        let (present, standing, since, told) = (BTreeSet::new(), BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
         Hazards { all: all.into(), by_state, present, standing, since, told }
     }
 }
@@ -203,12 +206,16 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// Takes in a finding, unless the same was said at the same place.
+    /// Takes in a finding, unless the same was said at the same place, or said of several other things.
     fn tell(&mut self, i: usize, d: Diagnostic) {
         let hazard = &self.hazards.all[i];
         let once = hazard.watched != Watched::Steps || !hazard.said.is_empty();
-        if once && !self.hazards.told.insert((d.span(), hazard.span)) {
-            return;
+        if once {
+            let told = self.hazards.told.entry((d.span(), hazard.span)).or_default();
+            if told.contains(&i) || told.len() >= MOST_THINGS {
+                return;
+            }
+            told.push(i);
         }
         if !self.found.iter().any(|f| f.span() == d.span() && f.headline == d.headline) {
             self.found.push(d);
