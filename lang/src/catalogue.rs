@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use matterix_ir::{FileId, Span};
 
-use crate::ast::{ExprKind, Field, FieldValue, File, Item, ItemKind, Term};
+use crate::ast::{Expr, ExprKind, Field, FieldValue, File, Item, ItemKind, Term};
 use crate::chem::{Formula, Structure};
 use crate::{library, near, syntax};
 
@@ -62,6 +62,8 @@ pub struct Substance {
     pub name: String,
     /// Its other names.
     pub aliases: Vec<String>,
+    /// What it is called besides, in `synonyms`: words that no file can write for it, and that others may share.
+    pub synonyms: Vec<String>,
     /// Its documentation.
     pub about: String,
     /// Its module, or file.
@@ -99,7 +101,7 @@ pub struct Catalogue {
 /// Fields that are shown by themselves, or say what a species is without a number.
 const IDENTITY: &[&str] = &["smiles", "formula", "cas"];
 /// Fields in which digits are no measured numbers.
-const WORDS: &[&str] = &["phase", "hazards", "dissolves", "reactive_groups", "by", "same_as"];
+const WORDS: &[&str] = &["phase", "hazards", "synonyms", "dissolves", "reactive_groups", "by", "same_as"];
 
 impl Catalogue {
     /// Reads the library, and files by their paths and texts.
@@ -125,8 +127,8 @@ impl Catalogue {
         &self.all
     }
 
-    /// What a word means: a name or alias, a CAS number, a name in other letters or as its documentation has it, a formula, a structure;
-    /// the first of these under which there is something, then the others.
+    /// What a word means: a name or alias, a CAS number, a name in other letters or as its documentation or synonyms have it, a formula, a
+    /// structure; the first of these under which there is something, then the others.
     pub fn find(&self, word: &str) -> Vec<Found<'_>> {
         let plain = plain(word);
         let formula = Formula::parse(word).ok();
@@ -140,7 +142,7 @@ impl Catalogue {
         let mut found = vec![
             by("name", &|s| s.names().any(|name| name == word)),
             by("CAS number", &|s| s.cas.as_deref() == Some(word)),
-            by("name", &|s| !exact && s.names().chain([s.title()]).any(|name| self::plain(name) == plain)),
+            by("name", &|s| !exact && s.words().any(|name| self::plain(name) == plain)),
             by("formula", &|s| formula.is_some() && s.composition() == formula),
             by("structure", &|s| structure.as_ref().is_some_and(|asked| s.is(asked))),
         ];
@@ -165,6 +167,11 @@ impl Substance {
         std::iter::once(self.name.as_str()).chain(self.aliases.iter().map(String::as_str))
     }
 
+    /// All by which it may be asked for: its names, its title and its synonyms.
+    fn words(&self) -> impl Iterator<Item = &str> {
+        self.names().chain([self.title()]).chain(self.synonyms.iter().map(String::as_str))
+    }
+
     /// The first sentence of its documentation, without the stop: `Propanone`.
     pub fn title(&self) -> &str {
         let line = self.about.split(". ").next().unwrap_or_default();
@@ -182,9 +189,10 @@ impl Substance {
     }
 }
 
-/// A name without capitals, blanks and signs.
+/// A name without capitals, blanks and signs, sulphur as sulfur.
 fn plain(name: &str) -> String {
-    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+    let letters: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+    letters.replace("sulph", "sulf")
 }
 
 /// The modules that every file sees.
@@ -237,6 +245,7 @@ fn substance(
     Substance {
         name: name.to_string(),
         aliases: Vec::new(),
+        synonyms: texts(field(fields, "synonyms")),
         module: text.module.clone(),
         import: import.then(|| format!("use {}", text.module)),
         formula,
@@ -251,6 +260,17 @@ fn substance(
 
 fn field<'a>(fields: &'a [Field], key: &str) -> Option<&'a FieldValue> {
     fields.iter().find(|f| f.key.text == key).map(|f| &f.value)
+}
+
+/// The texts of a list, `["table salt", "rock salt"]`.
+fn texts(value: Option<&FieldValue>) -> Vec<String> {
+    let Some(FieldValue::Expr(expr)) = value else { return Vec::new() };
+    let ExprKind::List(items) = &*expr.kind else { return Vec::new() };
+    let text = |item: &Expr| match &*item.kind {
+        ExprKind::Text(text) => Some(text.clone()),
+        _ => None,
+    };
+    items.iter().filter_map(text).collect()
 }
 
 fn one(text: &Text, field: &Field, about: &str, sources: &BTreeMap<String, String>) -> Stated {
@@ -394,6 +414,21 @@ mod tests {
             remark: "alone".to_string(),
         };
         assert_eq!(sources, [None, None, Some(&book)]);
+    }
+
+    #[test]
+    fn a_synonym_is_a_name_that_several_may_share() {
+        let text = "mtx 1\n/// A.\nspecies AA { formula: \"H2O4S\", synonyms: [\"my acid\", \"oil\"] }\n/// B.\nspecies BB { formula: \
+            \"HCl\", synonyms: [\"oil\"] }\n";
+        let catalogue = Catalogue::read(&[("own.mtx".to_string(), text.to_string())]);
+        let found = |word: &str| -> Vec<String> {
+            let groups = catalogue.find(word);
+            let first = groups.first().filter(|group| group.by == "name");
+            first.map(|group| group.substances.iter().map(|s| s.name.clone()).collect()).unwrap_or_default()
+        };
+        assert_eq!(found("My Acid"), ["AA"]);
+        assert_eq!(found("oil"), ["AA", "BB"]);
+        assert_eq!(found("sulphuric acid"), ["H2SO4"]);
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
     equilibria.py [--check] [--report]
 
-`species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source;
+`species.csv` and `equilibria.csv` have a row for each species and equilibrium, a column for each number and one for its source. A heat of
+solution that no second source agrees with to 1 kJ/mol has `alone`, or `within` how much, behind the name of its source.
 `interactions.csv` has a row for each number of an interaction, with its terms.
 `modules.csv` says which modules there are and what they use; `sources.csv` what each tag stands for; `modules/NAME.md` is the page of each
 module, `modules/NAME.more` what else stands in it. The sections of docs/library.md on them are written too. With `--check` nothing is
@@ -153,14 +154,28 @@ def number(value):
 
 
 def tag(*names):
-    return "  // " + "".join(f"[{name}]" for name in dict.fromkeys(n for n in names if n))
+    """The comment that names sources; what stands in a cell after the name of one, `sit alone`, is a remark."""
+    found = [name.split(" ", 1) for name in dict.fromkeys(n for n in names if n)]
+    return "  // " + "".join(f"[{name}]" + "".join(f" {remark}" for remark in rest) for name, *rest in found)
+
+
+def listed_words(cell):
+    """Texts of a cell, with semicolons between them, as a list of the language."""
+    return ", ".join(f'"{word}"' for word in cell.split(";"))
+
+
+def check_digit(cas):
+    digits = [int(c) for c in cas.replace("-", "")]
+    return re.fullmatch(r"\d{2,7}-\d\d-\d", cas) and sum(i * d for i, d in enumerate(digits[-2::-1], 1)) % 10 == digits[-1]
 
 
 FIELDS = [
-    ("smiles", '"{}"', None), ("formula", '"{}"', None), ("phase", '"{}"', None), ("density", "{} g/mL", "density_source"),
+    ("smiles", '"{}"', None), ("formula", '"{}"', None), ("cas", '"{}"', None), ("synonyms", "[{}]", None), ("phase", '"{}"', None),
+    ("density", "{} g/mL", "density_source"),
     ("molar_volume", "{} mL/mol", "volume_source"), ("heat_capacity", "{} J/(mol*K)", "capacity_source"), ("melting_point", "{} degC", "crc"),
     ("boiling_point", "{} degC", "crc"), ("dissolves", "{}", None), ("pka", "{}", "pka_source"), ("pkah", "{}", "pkah_source"),
-    ("solubility", "{} g/kg", "solubility_source"), ("absorbs", "({}) L/(mol*cm)", "absorbs_source"), ("crowding", "{} mL/mol", "dh"),
+    ("solubility", "{} g/kg", "solubility_source"), ("heat_of_solution", "{} kJ/mol", "heat_source"),
+    ("absorbs", "({}) L/(mol*cm)", "absorbs_source"), ("crowding", "{} mL/mol", "dh"),
     ("ion_size", "{} nm", "pdh"), ("salting", "{}", "pdh"),
 ]
 
@@ -172,10 +187,10 @@ def species(row):
     for field, form, source in FIELDS:
         if row.get(field):
             name = row[source] if source and source in row else source
-            value = row[field].replace("\\", "\\\\")
+            value = listed_words(row[field]) if field == "synonyms" else row[field].replace("\\", "\\\\")
             lines.append(f"    {field}: {form.format(value)}" + (tag(name) if name else ""))
     if row["hazards"]:
-        lines.append("    hazards: [" + ", ".join(f'"{hazard}"' for hazard in row["hazards"].split(";")) + "]")
+        lines.append(f"    hazards: [{listed_words(row['hazards'])}]")
     return lines + ["}", ""]
 
 
@@ -259,7 +274,9 @@ def module(entry, all_species, all_equilibria, all_interactions, sources):
     head = ["mtx 1"]
     for paragraph in (HERE / "modules" / f"{name}.md").read_text(encoding="utf8").strip().split("\n\n"):
         head += [f"//! {line}" for line in wrapped(paragraph.replace("\n", " "))] + ["//!"]
-    head += ["//! `[x]` after a number names its source:", "//!"]
+    remarked = ". `alone` says that a heat of solution was compared with no other, `within` by how much another is off; the rest agree within 1 kJ/mol"
+    said = f"`[x]` after a number names its source{remarked if re.search(r'// .*] (alone|within)', chr(10).join(body)) else ''}:"
+    head += [f"//! {line}" for line in wrapped(said)] + ["//!"]
     for row in used:
         first, *rest = wrapped(f"- `[{row['tag']}]` {row['says']}")
         head += [f"//! {first}"] + [f"//!   {line}" for line in rest]
@@ -376,6 +393,7 @@ def main():
         table(f"{name}.csv") for name in ("modules", "species", "equilibria", "interactions", "sources")
     )
     found = faults(rows)
+    found += [f"{row['name']}: the check digit of {row['cas']} is wrong" for row in all_species if row.get("cas") and not check_digit(row["cas"])]
     for entry in modules:
         text = module(entry, all_species, rows, acting, sources)
         path = LIBRARY / f"{entry['module']}.mtx"

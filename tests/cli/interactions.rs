@@ -23,7 +23,7 @@ fn runs(dir: &std::path::Path, items: &str, holding: &str, expectations: &str) {
 #[test]
 fn strong_solutions_are_those_measured() {
     let dir = folder("brines");
-    // Osmotic coefficients and solubilities at 25 degC of the CRC Handbook; 0.1 mol/kg of HCl has a pH of 1.10.
+    // Osmotic coefficients and solubilities of the CRC Handbook, at 25 degC where none is said; 0.1 mol/kg of HCl has a pH of 1.10.
     let cases = [
         ("100 g of water + 0.6 mol of NaCl", "osmotic_coefficient(cup.contents)", "1.265 .. 1.277"),
         ("100 g of water + 0.1 mol of NaCl", "osmotic_coefficient(cup.contents)", "0.932 .. 0.940"),
@@ -31,6 +31,9 @@ fn strong_solutions_are_those_measured() {
         ("100 g of water + 80 g of NaCl", "cup.contents.amount[Na+] / (1 mol)", "0.610 .. 0.620"),
         ("100 g of water + 80 g of KCl", "cup.contents.amount[K+] / (1 mol)", "0.472 .. 0.484"),
         ("100 g of water + 10 mmol of HCl", "acidity(cup.contents)", "1.09 .. 1.11"),
+        // 9.32 % and, at 60 degC, 13.7 % of the solution.
+        ("100 g of water + 40 g of NaHCO3", "cup.contents.amount[Na+] / (1 mol)", "0.121 .. 0.124"),
+        ("100 g of water + 40 g of NaHCO3 at 60 degC", "cup.contents.amount[Na+] / (1 mol)", "0.186 .. 0.191"),
     ];
     for (holding, asked, window) in cases {
         runs(&dir, "use std::brines", holding, &format!("    expect {asked} in {window}\n"));

@@ -24,6 +24,30 @@ fn a_substance_is_found_by_name_alias_formula_number_and_structure() {
 }
 
 #[test]
+fn a_substance_is_found_by_what_its_label_says() {
+    let labels = [
+        ("Sulphuric acid", "H2SO4"),
+        ("hydrochloric acid", "HCl"),
+        ("calcium carbonate", "CaCO3"),
+        ("sodium bicarbonate", "NaHCO3"),
+        ("baking soda", "NaHCO3"),
+        ("table salt", "NaCl"),
+        ("bleach", "NaOCl"),
+        ("vinegar", "acetic_acid"),
+        ("Epsom salt", "magnesium_sulfate_heptahydrate"),
+        ("7447-41-8", "lithium_chloride"),
+        ("77-86-1", "tris"),
+    ];
+    for (label, name) in labels {
+        let page = asked(&[label]);
+        assert!(page.starts_with(&format!("{name}\n")), "{label}: {page}");
+    }
+    let several = asked(&["copper sulfate"]);
+    assert!(several.starts_with("2 substances have the name `copper sulfate`:\n"), "{several}");
+    assert!(asked(&["ferric chloride"]).contains("iron_III_chloride_hexahydrate"));
+}
+
+#[test]
 fn every_number_is_printed_with_its_source_in_full() {
     let page = asked(&["acetone"]);
     for line in [
