@@ -194,11 +194,22 @@ def species(row):
     return lines + ["}", ""]
 
 
+def heats():
+    """Heats of solution, as they are written."""
+    found = {}
+    for path in (LIBRARY / "species.mtx", LIBRARY / "salts.mtx"):
+        for name, body in re.findall(r"^species (\S+) \{\n(.*?)^\}", path.read_text(encoding="utf8"), re.M | re.S):
+            heat = re.search(r"^    heat_of_solution: (.*? kJ/mol)", body, re.M)
+            if heat:
+                found[name] = heat.group(1)
+    return found
+
+
 def equilibrium(row):
     window = f"valid: {row['low']} degC .. {row['high']} degC"
     sources = tag(row["source"], row["enthalpy_source"])
     head = f"equilibrium {row['name']}: {row['equation']} {{"
-    said = []
+    said, more = [], []
     if row["analytic"]:
         constant = "analytic: [" + ", ".join(number(x) for x in row["analytic"].split()) + "]"
         sources = tag(row["source"])
@@ -206,6 +217,8 @@ def equilibrium(row):
         numbers, worst, names = crystallising(row)
         constant = "analytic: [" + ", ".join(number(x) for x in numbers) + "]"
         sources = tag(*names)
+        heat = heats().get(row["equation"].split(" <->")[0])
+        more = [f"    heat: {heat}"] if heat else []
         said = [f"    // met within {max(worst, 0.1):.1f} %"]
     elif row["capacity"] and row["kind"] == "pka":
         constant = "analytic: [" + ", ".join(number(x) for x in analytic(row)) + "]"
@@ -218,7 +231,7 @@ def equilibrium(row):
     doc = [f"/// {row['doc']}"]
     if len(line) <= WIDTH and not said:
         return doc + [line, ""]
-    return doc + [head] + said + [f"    {constant}{sources}", f"    {window}", "}", ""]
+    return doc + [head] + said + [f"    {constant}{sources}", *more, f"    {window}", "}", ""]
 
 
 def interactions(rows):

@@ -98,7 +98,7 @@ const FIELDS: &[(&str, &[&str])] = &[
     ("interaction", &["b0", "b1", "b2", "c0", "reach", "theta", "lambda", "psi", "zeta", "source"]),
     (
         "equilibrium",
-        &["constant", "log_constant", "pka", "ksp", "pksp", "analytic", "at", "enthalpy", "valid", "source"],
+        &["constant", "log_constant", "pka", "ksp", "pksp", "analytic", "at", "enthalpy", "heat", "valid", "source"],
     ),
     ("reactive_group", &["title", "smarts", "unless", "members", "above", "source"]),
     ("material", &["title", "friction", "source"]),

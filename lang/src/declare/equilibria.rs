@@ -17,11 +17,14 @@ pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp
 /// The field that gives the standard potential of a half-cell.
 pub const POTENTIAL: &str = "potential";
 
+/// The field that gives the heat where the constant does not: one that was fitted to amounts, and moves with more than the temperature.
+pub const HEAT: &str = "heat";
+
 /// The field that gives the constant at every temperature.
 pub const ANALYTIC: &str = "analytic";
 
 const FIELDS: &[&str] =
-    &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC, "at", "enthalpy", "valid", "source"];
+    &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC, "at", "enthalpy", HEAT, "valid", "source"];
 
 /// An equilibrium whose species are all known.
 #[derive(Clone, Debug)]
@@ -141,6 +144,12 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
             )
             .because(first.key.span, "the first one"),
         ),
+        (Some(first), None) if first.key.text != ANALYTIC && field(fields, HEAT).is_some() => {
+            let Some(heat) = field(fields, HEAT) else { return };
+            let headline = format!("the heat of `{name}` is its `enthalpy`");
+            let d = Diagnostic::error(codes::UNKNOWN_FIELD, heat.key.span, headline, "stands beside `analytic` alone");
+            diagnostics.push(d.because(first.key.span, "its constant").help("write `enthalpy`"));
+        }
         (Some(first), None) if first.key.text == ANALYTIC => {
             for second in ["at", "enthalpy"].iter().filter_map(|key| field(fields, key)) {
                 let headline = format!("`{name}` has a constant at every temperature");

@@ -12,7 +12,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
-use crate::declare::equilibria::{ANALYTIC, CONSTANTS, POTENTIAL};
+use crate::declare::equilibria::{ANALYTIC, CONSTANTS, HEAT, POTENTIAL};
 use crate::declare::species::field;
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::interactions::Acting;
@@ -398,7 +398,9 @@ impl<'a> Elaborator<'a> {
         let (name, fields, module) = (def.name.clone(), def.fields, def.module);
         let (key, given) = CONSTANTS.iter().find_map(|key| Some((*key, expr_of(fields, key)?)))?;
         if key == ANALYTIC {
-            return self.analytic(given, module);
+            let constant = self.analytic(given, module)?;
+            let enthalpy = self.enthalpy_of(e, HEAT).unwrap_or(constant.enthalpy);
+            return Some(Constant { enthalpy, ..constant });
         }
         let v = self.expr(given, &mut Scope::module(module));
         let ty = if key == POTENTIAL { self.voltage() } else { Type::ratio() };
@@ -421,7 +423,9 @@ impl<'a> Elaborator<'a> {
         };
         let mut terms = [self.graph.number(0.0); Layout::TERMS];
         terms[0] = ln_k;
-        let Some(enthalpy) = self.enthalpy_of(e) else { return Some(Constant { enthalpy: terms[1], terms }) };
+        let Some(enthalpy) = self.enthalpy_of(e, "enthalpy") else {
+            return Some(Constant { enthalpy: terms[1], terms });
+        };
         // The law of van 't Hoff: ln K = ln K(at) + enthalpy / R (1 / at - 1 / T).
         let at = self.given_at(e)?;
         let gas = self.graph.number(GAS);
@@ -475,14 +479,14 @@ impl<'a> Elaborator<'a> {
         -terms.iter().filter(|(s, _)| self.is_formal(*s)).map(|(_, n)| n).sum::<f64>()
     }
 
-    fn enthalpy_of(&mut self, e: usize) -> Option<NodeId> {
+    fn enthalpy_of(&mut self, e: usize, key: &str) -> Option<NodeId> {
         let def = &self.tables.equilibria[e];
-        let (name, given, module) = (def.name.clone(), expr_of(def.fields, "enthalpy")?, def.module);
+        let (name, given, module) = (def.name.clone(), expr_of(def.fields, key)?, def.module);
         let dimension = self.tables.units.named("Energy").over(&self.tables.units.named("Amount"));
         let v = self.expr(given, &mut Scope::module(module));
         let ty = Type::Quantity { dimension, point: false, optional: false };
-        match self.coerce(v, &ty, given.span, "enthalpy") {
-            Value::Num(n) => Some(self.name_param(&format!("{name}.enthalpy"), n, given.span).node),
+        match self.coerce(v, &ty, given.span, key) {
+            Value::Num(n) => Some(self.name_param(&format!("{name}.{key}"), n, given.span).node),
             _ => None,
         }
     }

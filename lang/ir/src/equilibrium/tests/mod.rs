@@ -348,10 +348,8 @@ fn what_is_absent_or_dry_is_no_trouble() {
 
 #[test]
 fn a_total_that_rounding_leaves_below_nothing_is_followed() {
-    let iodine = Sketch::new()
-        .equation("-1 water 1 H+ 1 OH-", -13.995, 55.8)
-        .equation("-1 I2 -1 I- 1 I3-", 2.86, 0.0)
-        .build();
+    let iodine =
+        Sketch::new().equation("-1 water 1 H+ 1 OH-", -13.995, 55.8).equation("-1 I2 -1 I- 1 I3-", 2.86, 0.0).build();
     for excess in [1e-3, 1e-9, 2.9e-14, 1e-20, 0.0, -1e-20, -2.9e-14, -1e-9, -1e-3] {
         let mixture = Mixture { system: iodine.system.clone(), args: iodine.args.clone() };
         let mut mixture = mixture.real().with(&[("water", 6.71), ("I2", 1e-3), ("I-", 0.023), ("I3-", excess - 1e-3)]);
