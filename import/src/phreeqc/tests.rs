@@ -125,9 +125,9 @@ fn numbers_of_pitzer_become_interactions() {
                 -LAMBDA\n  Xx(aq) Na+ 0.1\n-ETA\n  Na+ Cl- 1\n";
     let made = import(text, "x", &Wanted::default()).unwrap();
     for line in [
-        "interaction between_Cl_Na: Cl- + Na+ { b0: [0.075, 9598.4], c0: 0.00148, reach: [2, 1] }",
-        "interaction between_K_Na: K+ + Na+ { theta: -0.012 }",
-        "interaction between_Cl_K_Na: Cl- + K+ + Na+ { psi: [-0.0015, 0, 0, 1.8e-5] }",
+        "interaction between_Cl_minus_Na_plus: Cl- + Na+ { b0: [0.075, 9598.4], c0: 0.00148, reach: [2, 1] }",
+        "interaction between_K_plus_Na_plus: K+ + Na+ { theta: -0.012 }",
+        "interaction between_Cl_minus_K_plus_Na_plus: Cl- + K+ + Na+ { psi: [-0.0015, 0, 0, 1.8e-5] }",
     ] {
         assert!(made.text.contains(line), "{}", made.text);
     }

@@ -13,7 +13,7 @@ use crate::eval::lab::budget::Budget;
 use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
 use crate::lower::{Planner, script};
-use crate::names::{DeclId, verb_text};
+use crate::names::{DeclId, module_candidates, verb_text};
 use crate::semantic_index::Seeing;
 
 /// Checks the declarations of one module.
@@ -43,10 +43,18 @@ pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, s
         *seeing = lab.meanings.take();
         out.append(&mut lab.diagnostics);
     }
-    // What accepts a hazard declares no name.
+    // What accepts a hazard, or uses a module, declares no name.
     for item in &tables.names.modules[module].tree.items {
-        if let ItemKind::Accept { name, .. } = &item.kind {
-            constants.check_accepted(name, module);
+        match &item.kind {
+            ItemKind::Accept { name, .. } => constants.check_accepted(name, module),
+            ItemKind::Use { path, names } if !tables.equilibria.is_empty() => {
+                let is_it = |name: &String| tables.names.modules.iter().position(|m| m.name == *name);
+                let used = module_candidates(path, names.is_some()).iter().find_map(is_it);
+                if let (Some(used), Some(first), Some(last)) = (used, path.segments.first(), path.segments.last()) {
+                    constants.check_circles_of_module(used, first.span.to(last.span));
+                }
+            }
+            _ => {}
         }
     }
     out.append(&mut constants.diagnostics);

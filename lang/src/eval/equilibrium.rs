@@ -8,7 +8,7 @@ use matterix_ir::equilibrium::{
     terms as terms_at,
 };
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, UnaryOp, codes};
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
@@ -538,18 +538,12 @@ impl<'a> Elaborator<'a> {
 
     /// An equilibrium that follows from those before it must agree with them: each circle of constants closes.
     pub fn check_circles(&mut self, last: usize) {
-        let all = match self.circles.clone() {
-            Some(known) => known,
-            None => {
-                let found = Arc::new(self.all_circles());
-                self.circles.insert(found).clone()
-            }
-        };
+        let all = self.known_circles();
         match &*all {
             Ok(circles) => circles
                 .iter()
                 .filter(|circle| circle.factors.iter().rposition(|f| f.abs() > NO_PART) == Some(last))
-                .for_each(|circle| self.check_circle(&circle.factors)),
+                .for_each(|circle| self.check_circle(&circle.factors, None)),
             Err(why) => {
                 let def = &self.tables.equilibria[last];
                 if why.0.contains(&format!("`{}`", def.name)) {
@@ -558,6 +552,32 @@ impl<'a> Elaborator<'a> {
                         Diagnostic::error(codes::EQUILIBRIUM_FORM, def.equation, headline, "needs something dissolved");
                     self.report(d.help("an equilibrium relates what is dissolved in water, or a solid and its ions"));
                 }
+            }
+        }
+    }
+
+    fn known_circles(&mut self) -> Arc<Result<Vec<Circle>, Unsettled>> {
+        match self.circles.clone() {
+            Some(known) => known,
+            None => {
+                let found = Arc::new(self.all_circles());
+                self.circles.insert(found).clone()
+            }
+        }
+    }
+
+    /// A module of the library must agree with the others that a file uses: some have the same salts with other constants.
+    pub fn check_circles_of_module(&mut self, module: usize, used: Span) {
+        let all = self.known_circles();
+        let Ok(circles) = &*all else { return };
+        for circle in circles {
+            let part: Vec<usize> = (0..circle.factors.len()).filter(|e| circle.factors[*e].abs() > NO_PART).collect();
+            let of = |e: &usize| self.tables.equilibria[*e].module;
+            let is_library = |e: &usize| self.tables.names.modules[of(e)].is_library();
+            let is_here = part.iter().any(|e| of(e) == module) && part.iter().any(|e| of(e) != module);
+            // It is told where the last of its modules is used.
+            if is_here && part.iter().all(is_library) && part.iter().map(of).max() == Some(module) {
+                self.check_circle(&circle.factors, Some(used));
             }
         }
     }
@@ -610,7 +630,8 @@ impl<'a> Elaborator<'a> {
         self.report(d.help("leave the reaction out, or the equilibria if it is the slow step that you want to follow"));
     }
 
-    fn check_circle(&mut self, factors: &[f64]) {
+    /// Whether a circle closes; told where the last of its equilibria stands, or at a place that is given.
+    fn check_circle(&mut self, factors: &[f64], at: Option<Span>) {
         let part: Vec<(usize, f64)> = factors.iter().copied().enumerate().filter(|(_, f)| f.abs() > NO_PART).collect();
         // Where enthalpies contradict each other, the circle is open at other temperatures.
         let mut sums = [0.0; 2];
@@ -631,7 +652,7 @@ impl<'a> Elaborator<'a> {
         let Some((last, _)) = part.last() else { return };
         let last = &self.tables.equilibria[*last];
         let headline = format!("the constants of {} contradict each other", joined(&names, "and"));
-        let mut d = Diagnostic::error(codes::EQUILIBRIA_CONTRADICT, last.equation, headline, label);
+        let mut d = Diagnostic::error(codes::EQUILIBRIA_CONTRADICT, at.unwrap_or(last.equation), headline, label);
         for (e, _) in &part[..part.len() - 1] {
             let other = &self.tables.equilibria[*e];
             d = d.because(other.equation, format!("`{}` is one of the others", other.name));

@@ -144,7 +144,7 @@ mod tests {
             "### `Heater`",
             "`heat HEATER to T`",
             "| `to` | `t` | `Temperature` | degC |",
-            "`t in limits`, else `out_of_range`: choose a set point within its limits",
+            "`t in limits`, else `out_of_range`: choose a set point in its range",
         ] {
             assert!(thermal.text.contains(wanted), "{wanted}\n{}", thermal.text);
         }

@@ -1,5 +1,6 @@
 //! Expressions: what each name in them stands for, and what kind of value they have.
 
+use matterix_ir::Span;
 use matterix_lang::ast::{Arg, Binary, Expr, ExprKind, Name, Text, TextPart, Unary};
 use matterix_lang::eval::lab::grids::Place;
 use matterix_lang::semantic_index::Sort;
@@ -375,8 +376,21 @@ impl Walk<'_> {
         }
     }
 
+    /// `CO2(g)`: a species whose name ends with its phase, with the places of both.
+    fn species_in_phase(&self, callee: &Expr, args: &[Arg]) -> Option<(Span, Span, DefId)> {
+        let (ExprKind::Name(name), [Arg { name: None, value }]) = (&*callee.kind, args) else { return None };
+        let ExprKind::Name(phase) = &*value.kind else { return None };
+        let def = self.index.lookup(self.at, &format!("{}({})", name.text, phase.text))?;
+        (self.index.def(def).kind == Kind::Species).then_some((name.span, phase.span, def))
+    }
+
     /// `f(x, name: y)`.
     fn function(&mut self, callee: &Expr, args: &[Arg]) -> Found {
+        if let Some((name, phase, def)) = self.species_in_phase(callee, args) {
+            self.known(name, def);
+            self.language(phase, "the phase of a species");
+            return Found::of(self.index.def(def).sort.clone());
+        }
         let mut params: Vec<DefId> = Vec::new();
         let mut result = Found::nothing();
         match &*callee.kind {

@@ -184,9 +184,10 @@ impl Problem<'_> {
         let longest = step[..=places.solvent()].iter().fold(0.0_f64, |most, s| most.max(s.abs()));
         let warmest = step.get(places.temperature()).map_or(0.0, |by| by.abs());
         let share = 1.0_f64.min(most / longest).min(WARMEST_STEP / warmest);
-        let before = x[places.sums()].to_vec();
-        x.iter_mut().zip(step).for_each(|(x, step)| *x += share * step);
-        x[places.sums()].iter_mut().zip(before).for_each(|(x, before)| *x = x.max(0.1 * before));
+        for (i, (x, step)) in x.iter_mut().zip(step).enumerate() {
+            let next = *x + share * step;
+            *x = if places.sums().contains(&i) { next.max(0.1 * *x) } else { next };
+        }
         let temperature = &mut x[places.temperature()];
         *temperature = temperature.clamp(TEMPERATURES.0, TEMPERATURES.1);
     }

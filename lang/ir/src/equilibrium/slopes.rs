@@ -198,11 +198,7 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
         Part::Amount(i) => amount(i as usize),
         Part::Activity(i) => {
             let i = i as usize;
-            let formed: f64 = problem.masters_of(i).iter().map(|(c, of)| of * direction.step[*c]).sum();
-            let mut others = vec![0.0; places.count() - places.masters];
-            problem.activity_by(i, &point.state, &mut others);
-            let behind = &direction.step[places.masters..];
-            formed + direction.raised[i] + others.iter().zip(behind).map(|(by, step)| by * step).sum::<f64>()
+            problem.raise(&direction.step, &point.state, i) + direction.raised[i]
         }
         Part::Temperature => direction.step[places.temperature()],
         Part::Strength => direction.step[places.strength()],

@@ -196,14 +196,20 @@ impl Problem<'_> {
     pub(super) fn jacobian(&self, state: &State, free: usize, matrix: &mut Matrix) {
         let (basis, places) = (&*self.basis, self.places());
         matrix.clear(free);
-        let mut others = vec![0.0; places.count() - places.masters];
         for &i in &basis.solutes {
             let (amount, parts) = (state.amounts[i], basis.masters_of.row(i));
-            self.amount_by(i, state, &mut others);
+            let (by, by_placed) = (self.amount_by(i, state), self.by_placed(i, state));
             let add = |row: &mut [f64], share: f64| {
                 parts.iter().for_each(|(column, of)| row[*column] += share * of);
                 // Those that are not free are cut off.
-                row[basis.masters.len()..].iter_mut().zip(&others).for_each(|(to, by)| *to += share * by);
+                row[basis.masters.len()..].iter_mut().zip(&by[..3]).for_each(|(to, by)| *to += share * by);
+                if places.strength() < row.len() {
+                    let placed = row[places.placed()].iter_mut().enumerate();
+                    placed.for_each(|(j, to)| *to += share * by_placed.of(j));
+                }
+                if let Some(to) = row.get_mut(places.temperature()) {
+                    *to += share * by[3];
+                }
             };
             self.each_row(i, state, free, |row, share| add(matrix.row_mut(row), share * amount));
         }
@@ -220,25 +226,38 @@ impl Problem<'_> {
         }
     }
 
-    /// How the logarithm of the activity of a member moves with the unknowns behind the masters.
-    pub(super) fn activity_by(&self, member: usize, state: &State, to: &mut [f64]) {
-        let (dryness, effects) = (self.dryness(member), &state.effects);
-        let last = to.len() - 1;
-        to[..3].copy_from_slice(&[0.0, 0.0, dryness]);
-        to[3..last].iter_mut().zip(&effects.osmotic_by).for_each(|(to, by)| *to = dryness * by);
-        to[last] = state.rises[member] + dryness * state.warming.osmotic;
+    /// How the logarithm of the activity of a member moves with the solvent, the ionic strength, the molality of all, and the temperature.
+    fn activity_by(&self, member: usize, state: &State) -> [f64; 4] {
+        let dryness = self.dryness(member);
+        [0.0, 0.0, dryness, state.rises[member] + dryness * state.warming.osmotic]
     }
 
-    /// How the logarithm of the amount of a dissolved member moves with them.
-    fn amount_by(&self, member: usize, state: &State, to: &mut [f64]) {
-        self.activity_by(member, state, to);
-        let (coefficient, last) = (&state.coefficients[member], to.len() - 1);
-        to[0] += 1.0;
-        to[1] -= coefficient.by_strength;
-        if let Some(k) = self.system.virial.as_ref().and_then(|virial| virial.place(member)) {
-            to[3..last].iter_mut().zip(state.effects.by.row(k)).for_each(|(to, by)| *to -= by);
-        }
-        to[last] -= coefficient.by_warmth;
+    /// The same of the amount of a dissolved member.
+    fn amount_by(&self, member: usize, state: &State) -> [f64; 4] {
+        let ([solvent, strength, molality, warmth], of) =
+            (self.activity_by(member, state), &state.coefficients[member]);
+        [solvent + 1.0, strength - of.by_strength, molality, warmth - of.by_warmth]
+    }
+
+    /// How it moves with the molality of each placed member.
+    fn by_placed<'s>(&self, member: usize, state: &'s State) -> ByPlaced<'s> {
+        let place = self.system.virial.as_ref().and_then(|virial| virial.place(member));
+        let own = place.map_or(&[][..], |k| state.effects.by.row(k));
+        ByPlaced { own, solvent: &state.effects.osmotic_by, dryness: self.dryness(member) }
+    }
+
+    /// How much the logarithm of the activity of a member grows where the unknowns do.
+    pub(super) fn raise(&self, step: &[f64], state: &State, member: usize) -> f64 {
+        let solvent = ByPlaced { own: &[], ..self.by_placed(member, state) };
+        self.along(step, member, self.activity_by(member, state), &solvent)
+    }
+
+    fn along(&self, step: &[f64], member: usize, by: [f64; 4], by_placed: &ByPlaced<'_>) -> f64 {
+        let places = self.places();
+        let formed: f64 = self.masters_of(member).iter().map(|(c, of)| of * step[*c]).sum();
+        let placed: f64 = step[places.placed()].iter().enumerate().map(|(j, step)| by_placed.of(j) * step).sum();
+        let others = [places.solvent(), places.strength(), places.molality(), places.temperature()];
+        formed + placed + others.iter().zip(by).map(|(place, by)| by * step[*place]).sum::<f64>()
     }
 
     /// What an unknown is made of that sums amounts up: mol.
@@ -290,11 +309,7 @@ impl Problem<'_> {
             Phase::Solvent => amount * step[places.solvent()],
             Phase::Solid | Phase::Formal => 0.0,
             Phase::Solute => {
-                let formed: f64 = self.masters_of(member).iter().map(|(c, of)| of * step[*c]).sum();
-                let mut others = vec![0.0; places.count() - places.masters];
-                self.amount_by(member, state, &mut others);
-                let others: f64 = others.iter().zip(&step[places.masters..]).map(|(by, step)| by * step).sum();
-                amount * (formed + others)
+                amount * self.along(step, member, self.amount_by(member, state), &self.by_placed(member, state))
             }
         }
     }
@@ -328,6 +343,22 @@ impl Problem<'_> {
         let is_formal = |k: usize| self.basis.formal.contains(&self.basis.held[k]);
         let amount = |(k, total): (usize, &f64)| if is_formal(k) { 0.0 } else { total - dissolved(k) };
         totals.held.iter().enumerate().map(amount).collect()
+    }
+}
+
+/// How something moves with the molality of each placed member.
+#[derive(Clone, Copy)]
+struct ByPlaced<'s> {
+    /// What a coefficient does, by placed member.
+    own: &'s [f64],
+    /// What the activity of the solvent does, of which there is so much in it.
+    solvent: &'s [f64],
+    dryness: f64,
+}
+
+impl ByPlaced<'_> {
+    fn of(&self, place: usize) -> f64 {
+        self.dryness * self.solvent[place] - self.own.get(place).copied().unwrap_or(0.0)
     }
 }
 
