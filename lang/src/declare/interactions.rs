@@ -152,12 +152,14 @@ fn check_numbers(name: &str, kind: Kind, fields: &[Field], span: Span, diagnosti
     let own = kind.numbers();
     let wanted: Vec<String> = own.iter().map(|n| format!("`{n}`")).collect();
     let is_own = |key: &str| own.contains(&key) || key == "source" || (key == REACH && kind == Kind::Opposite);
-    for f in fields.iter().filter(|f| FIELDS.contains(&f.key.text.as_str()) && !is_own(&f.key.text)) {
+    let misplaced = fields.iter().filter(|f| FIELDS.contains(&f.key.text.as_str()) && !is_own(&f.key.text));
+    let before = diagnostics.len();
+    for f in misplaced {
         let headline = format!("species of these charges have no `{}`", f.key.text);
         let d = Diagnostic::error(codes::INTERACTION_FORM, f.key.span, headline, "of other charges");
         diagnostics.push(d.because(span, format!("`{name}` has {}", joined(&wanted, "and"))));
     }
-    if own.iter().all(|key| field(fields, key).is_none()) {
+    if diagnostics.len() == before && own.iter().all(|key| field(fields, key).is_none()) {
         let headline = format!("`{name}` has no number");
         let d = Diagnostic::error(codes::MISSING_FIELD, span, headline, "how strong it is remains open");
         diagnostics.push(d.help(format!("it has {}", joined(&wanted, "or"))));
