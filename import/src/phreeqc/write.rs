@@ -160,9 +160,9 @@ impl Writer {
             if !interaction.reach.is_empty() {
                 fields.push(format!("reach: {}", terms(&interaction.reach)));
             }
-            let _ = write!(
+            let _ = writeln!(
                 self.interactions,
-                "interaction between_{}: {} {{ {} }}\n",
+                "interaction between_{}: {} {{ {} }}",
                 name.join("_"),
                 written.join(" + "),
                 fields.join(", ")
