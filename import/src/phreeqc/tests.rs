@@ -132,7 +132,7 @@ fn numbers_of_pitzer_become_interactions() {
         assert!(made.text.contains(line), "{}", made.text);
     }
     let left: Vec<&str> = made.left_out.iter().map(|left| left.name.as_str()).collect();
-    assert_eq!(left, ["Na+ Xx(aq)", "-ETA"]);
+    assert_eq!(left, ["Na+ Xx(aq)", "-eta"]);
     let wrong = |text: &str| import(text, "x", &Wanted::default()).unwrap_err();
     assert_eq!(wrong("PITZER\n Na+ Cl- 1\n").line, 2);
     assert_eq!(wrong("PITZER\n-B0\n Na+ Cl-\n").line, 3);
