@@ -60,8 +60,8 @@ fn imports(tree: &File) -> Vec<String> {
     paths.map(|name| name.text.clone()).collect()
 }
 
-/// The names that a module declares, where it has nothing but species, equilibria, interactions, constants, functions, cautions and imports; the prelude, which
-/// only imports, is none.
+/// The names that a module declares, where it has nothing but species, equilibria, interactions, constants, functions, cautions and
+/// imports; the prelude, which only imports, is none.
 fn only_matter(tree: &File) -> Option<Vec<String>> {
     let names = tree.items.iter().map(|item| match &item.kind {
         ItemKind::Species { name, .. }

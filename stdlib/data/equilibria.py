@@ -13,6 +13,7 @@ than 0.1 in log10 K or 3 kJ/mol.
 """
 
 import csv
+import functools
 import math
 import pathlib
 import re
@@ -194,6 +195,7 @@ def species(row):
     return lines + ["}", ""]
 
 
+@functools.cache
 def heats():
     """Heats of solution, as they are written."""
     found = {}
@@ -234,6 +236,12 @@ def equilibrium(row):
     return doc + [head] + said + [f"    {constant}{sources}", *more, f"    {window}", "}", ""]
 
 
+def named(between):
+    """The name of the interaction between some species."""
+    species = between.split()
+    return "between_" + "_".join(re.sub(r"(\^.*|(?<=[a-z])2?[+-]|(?<=[A-Z])[+-]|[+-])$", "", s) for s in species)
+
+
 def interactions(rows):
     lines, found = [], {}
     for row in rows:
@@ -243,7 +251,7 @@ def interactions(rows):
         terms = {row["number"]: [number(x) for x in row["terms"].split()] for row in numbers}
         said = [f"{key}: {of[0] if len(of) == 1 else '[' + ', '.join(of) + ']'}" for key, of in terms.items()]
         sources = tag(*(row["source"] for row in numbers))
-        name = "between_" + "_".join(re.sub(r"(\^.*|(?<=[a-z])2?[+-]|(?<=[A-Z])[+-]|[+-])$", "", s) for s in species)
+        name = named(between)
         head = f"interaction {name}: {' + '.join(species)} {{"
         doc = f"/// {', '.join(species[:-1])} and {species[-1]}."
         line = f"{head} {', '.join(said)} }}{sources}"
@@ -319,7 +327,7 @@ def section(entry, all_species, all_equilibria, all_interactions):
         lines += ["| name | is |", "| --- | --- |"]
         taken = {word: "(" + ", ".join(re.findall(r"(\w+):", given)) + ")" for _, kind, word, given in found if kind == "fn"}
         lines += [f"| {'caution ' if kind == 'caution' else ''}`{word}{taken.get(word, '')}` | {doc} |" for doc, kind, word, _ in found] + [""]
-    acting = [line.split()[1][:-1] for line in interactions([r for r in all_interactions if r["module"] == name]) if line.startswith("interaction")]
+    acting = list(dict.fromkeys(named(row["between"]) for row in all_interactions if row["module"] == name))
     if acting:
         lines += [f"Interactions ({len(acting)}):", "", listed(acting), ""]
     if name != "equilibria":

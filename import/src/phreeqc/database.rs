@@ -9,8 +9,8 @@ use crate::Mistake;
 /// Joules per calorie.
 const CALORIE: f64 = 4.184;
 
-/// The most numbers of an analytic expression.
-const TERMS: usize = 6;
+/// The most numbers of an analytic expression, or of one that moves with temperature like it.
+pub(super) const TERMS: usize = 6;
 
 /// A database.
 #[derive(Clone, Debug, Default)]
@@ -170,7 +170,7 @@ fn option(entry: &mut Entry, line: Line<'_>, name: &str, rest: &str) -> Result<(
             let all = numbers(line, rest, 1..=2)?;
             entry.gamma = Some((all[0], all.get(1).copied().unwrap_or(0.0)));
         }
-        "vm" => entry.volume = leading_numbers(rest),
+        "vm" => entry.volume = leading_numbers(rest.split_whitespace()),
         "add_logk" | "add_constant" | "no_check" | "mole_balance" | "mass_balance" => {
             entry.unread = Some(name.to_owned())
         }
@@ -183,12 +183,12 @@ fn option(entry: &mut Entry, line: Line<'_>, name: &str, rest: &str) -> Result<(
 }
 
 /// What stands after the numbers is a remark of the database.
-fn leading_numbers(rest: &str) -> Vec<f64> {
-    rest.split_whitespace().map_while(|word| word.parse::<f64>().ok().filter(|v| v.is_finite())).collect()
+pub(super) fn leading_numbers<'w>(words: impl IntoIterator<Item = &'w str>) -> Vec<f64> {
+    words.into_iter().map_while(|word| word.parse::<f64>().ok().filter(|v| v.is_finite())).collect()
 }
 
 fn numbers(line: Line<'_>, rest: &str, count: std::ops::RangeInclusive<usize>) -> Result<Vec<f64>, Mistake> {
-    let mut all = leading_numbers(rest);
+    let mut all = leading_numbers(rest.split_whitespace());
     if !count.contains(&all.len()) && all.len() < *count.start() {
         return Err(mistake(line, format!("`{}` lacks a number", line.text)));
     }

@@ -1,10 +1,8 @@
 //! What a database says of interactions: its block PITZER.
 
+use super::database::{TERMS, leading_numbers};
 use super::lines::Line;
 use crate::Mistake;
-
-/// The most terms of a number.
-const TERMS: usize = 6;
 
 /// Options whose lines have two or three species and the terms of a number, and how the language calls that number.
 const NUMBERS: &[(&str, usize, &str)] = &[
@@ -69,9 +67,7 @@ impl Block {
         }
         let words: Vec<&str> = line.text.split_whitespace().collect();
         let lacks = || Mistake { line: line.number, why: format!("`{}` lacks a species or a number", line.text) };
-        let terms = |count: usize| -> Vec<f64> {
-            words[count..].iter().map_while(|w| w.parse::<f64>().ok().filter(|v| v.is_finite())).collect()
-        };
+        let terms = |count: usize| leading_numbers(words[count..].iter().copied());
         match self.option {
             Some(Under::Number(count, number)) => {
                 if words.len() <= count {

@@ -153,7 +153,7 @@ impl Writer {
             let name: Vec<String> = interaction.species.iter().map(|s| names::word(s)).collect();
             let terms = |terms: &[f64]| match terms {
                 [one] => number(*one),
-                many => format!("[{}]", many.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", ")),
+                many => list(many),
             };
             let mut fields: Vec<String> =
                 interaction.numbers.iter().map(|(key, of)| format!("{key}: {}", terms(of))).collect();
@@ -229,8 +229,7 @@ impl Writer {
                 format!("log_constant: {}{}", number(log_k), enthalpy.unwrap_or_default())
             }
             (terms, _) => {
-                let terms: Vec<String> = terms.iter().map(|term| number(*term)).collect();
-                format!("analytic: [{}]", terms.join(", "))
+                format!("analytic: {}", list(terms))
             }
         };
         Some(format!("/// Line {} of the database.\nequilibrium {name}: {sides} {{ {constant} }}\n\n", entry.line))
@@ -303,6 +302,11 @@ pub fn apparent_volume(terms: &[f64]) -> f64 {
 fn round(value: f64, digits: i32) -> f64 {
     let scale = 10f64.powi(digits);
     (value * scale).round() / scale
+}
+
+/// Numbers as the language lists them.
+fn list(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", "))
 }
 
 /// A number as the language writes it.

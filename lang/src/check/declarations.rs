@@ -32,17 +32,22 @@ pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, s
     // Constants need no stand-ins of instances: what one of them is worth, the next one knows.
     let mut constants = stand_in();
     let mut budget = Budget::default();
+    // So are the circles of constants, which are those of the whole file.
+    let mut circles = None;
     for id in tables.names.declared_by(module) {
         let mut own = stand_in();
         let constant = matches!(tables.names.decl(id).item.kind, ItemKind::Const { .. });
         let lab = if constant { &mut constants } else { &mut own };
         lab.meanings = seeing.take();
         lab.budget = std::mem::take(&mut budget);
+        lab.circles = circles.take();
         declaration(lab, sources, id, module);
         budget = std::mem::take(&mut lab.budget);
+        circles = lab.circles.take();
         *seeing = lab.meanings.take();
         out.append(&mut lab.diagnostics);
     }
+    constants.circles = circles;
     // What accepts a hazard, or uses a module, declares no name.
     for item in &tables.names.modules[module].tree.items {
         match &item.kind {

@@ -9,7 +9,7 @@ use super::fields::unknown_fields;
 use super::reactions::{check_balance, equation};
 use super::species::{SpeciesTable, field};
 use crate::ast::{Field, ItemKind};
-use crate::names::{Names, used};
+use crate::names::{Decl, Names, item_name};
 
 /// The fields of which each gives the constant of an equilibrium.
 pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC];
@@ -67,16 +67,14 @@ pub fn collect<'a>(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<EquilibriumDef<'a>> {
     let mut out: Vec<EquilibriumDef<'a>> = Vec::new();
-    let is_equilibrium = |decl: &&crate::names::Decl<'a>| matches!(decl.item.kind, ItemKind::Equilibrium { .. });
     // Those of the library hold where a file asks for them.
-    let used = if names.decls.iter().any(|decl| is_equilibrium(&decl)) { used(names.modules) } else { Vec::new() };
-    let is_library = |decl: &crate::names::Decl<'a>| names.modules[decl.module].is_library();
-    let own: BTreeSet<&str> =
-        names.decls.iter().filter(is_equilibrium).filter(|d| !is_library(d)).filter_map(name_of).collect();
+    let all = || names.in_use(|kind| matches!(kind, ItemKind::Equilibrium { .. }));
+    let is_library = |decl: &&Decl<'a>| names.modules[decl.module].is_library();
+    let name_of = |decl: &Decl<'a>| item_name(decl.item).map(|(name, _)| name);
+    let own: BTreeSet<String> = all().filter(|decl| !is_library(decl)).filter_map(name_of).collect();
     // One of the file's own takes the place of the library's.
-    let is_replaced =
-        |decl: &&crate::names::Decl<'a>| is_library(decl) && name_of(decl).is_some_and(|name| own.contains(name));
-    for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true) && !is_replaced(decl)) {
+    let is_replaced = |decl: &&Decl<'a>| is_library(decl) && name_of(decl).is_some_and(|name| own.contains(&name));
+    for decl in all().filter(|decl| !is_replaced(decl)) {
         let ItemKind::Equilibrium { name, reactants, products, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "an equilibrium", diagnostics);
         let Some((left, right)) = species.sides(names, decl.module, (reactants, products), diagnostics) else {
@@ -110,14 +108,6 @@ pub fn collect<'a>(
         out.push(EquilibriumDef { name, module: decl.module, terms, solids, gas, fields, equation, span });
     }
     out
-}
-
-/// The name of an equilibrium.
-fn name_of<'n>(decl: &'n crate::names::Decl<'_>) -> Option<&'n str> {
-    match &decl.item.kind {
-        ItemKind::Equilibrium { name, .. } => Some(&name.text),
-        _ => None,
-    }
 }
 
 /// One of the fields gives its constant.

@@ -8,7 +8,7 @@ use super::fields::unknown_fields;
 use super::reactions::equation;
 use super::species::{SpeciesTable, field};
 use crate::ast::{Field, ItemKind};
-use crate::names::{Names, used};
+use crate::names::Names;
 
 /// The field that says how fast the numbers of two opposite charges fade.
 pub const REACH: &str = "reach";
@@ -79,9 +79,7 @@ pub fn collect<'a>(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<InteractionDef<'a>> {
     let mut out: Vec<InteractionDef<'a>> = Vec::new();
-    let is_interaction = |decl: &&crate::names::Decl<'a>| matches!(decl.item.kind, ItemKind::Interaction { .. });
-    let used = if names.decls.iter().any(|decl| is_interaction(&decl)) { used(names.modules) } else { Vec::new() };
-    for decl in names.decls.iter().filter(|decl| used.get(decl.module) == Some(&true)) {
+    for decl in names.in_use(|kind| matches!(kind, ItemKind::Interaction { .. })) {
         let ItemKind::Interaction { name, between, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "an interaction", diagnostics);
         let members = species.terms(names, decl.module, between, diagnostics);

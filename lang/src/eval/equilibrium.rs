@@ -573,13 +573,16 @@ impl<'a> Elaborator<'a> {
         for circle in circles {
             let part: Vec<usize> = (0..circle.factors.len()).filter(|e| circle.factors[*e].abs() > NO_PART).collect();
             let of = |e: &usize| self.tables.equilibria[*e].module;
-            let is_library = |e: &usize| self.tables.names.modules[of(e)].is_library();
             let is_here = part.iter().any(|e| of(e) == module) && part.iter().any(|e| of(e) != module);
             // It is told where the last of its modules is used.
-            if is_here && part.iter().all(is_library) && part.iter().map(of).max() == Some(module) {
+            if is_here && part.iter().all(|e| self.is_of_library(*e)) && part.iter().map(of).max() == Some(module) {
                 self.check_circle(&circle.factors, Some(used));
             }
         }
+    }
+
+    fn is_of_library(&self, e: usize) -> bool {
+        self.tables.names.modules[self.tables.equilibria[e].module].is_library()
     }
 
     /// The circles of all equilibria of the file.
@@ -658,9 +661,8 @@ impl<'a> Elaborator<'a> {
             d = d.because(other.equation, format!("`{}` is one of the others", other.name));
         }
         // One of the library gives way to one of the file with its name.
-        let is_library = |e: &usize| self.tables.names.modules[self.tables.equilibria[*e].module].is_library();
-        let theirs = part.iter().map(|(e, _)| *e).find(is_library);
-        let help = match theirs.filter(|_| part.iter().any(|(e, _)| !is_library(e))) {
+        let theirs = part.iter().map(|(e, _)| *e).find(|e| self.is_of_library(*e));
+        let help = match theirs.filter(|_| part.iter().any(|(e, _)| !self.is_of_library(*e))) {
             Some(e) => format!(
                 "leave out one of them: it follows from the rest; yours takes the place of the library's if you call it `{}`",
                 self.tables.equilibria[e].name

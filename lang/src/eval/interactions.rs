@@ -33,8 +33,7 @@ impl<'a> Elaborator<'a> {
         let mut scope = Scope::of_member(id, member);
         let mut numbers = items.iter().map(|item| {
             let value = self.expr(item, &mut scope);
-            let node = self.value_node(&value)?;
-            self.glance(node)
+            self.decided(&value)
         });
         let (holds, spread) = (numbers.next()??, numbers.next()??);
         (holds != 0.0).then_some(spread)
@@ -73,14 +72,14 @@ impl<'a> Elaborator<'a> {
             }
         };
         let Value::List(numbers) = list else { return None };
-        let numbers: Vec<f64> = numbers
-            .iter()
-            .map(|n| {
-                let node = self.value_node(n)?;
-                self.glance(node)
-            })
-            .collect::<Option<_>>()?;
+        let numbers: Vec<f64> = numbers.iter().map(|n| self.decided(n)).collect::<Option<_>>()?;
         numbers.try_into().ok()
+    }
+
+    /// A number of which the form of the law depends.
+    fn decided(&mut self, value: &Value) -> Option<f64> {
+        let node = self.value_node(value)?;
+        self.known(node)
     }
 
     /// The terms of all numbers of an interaction, as [`Layout`] has them.

@@ -301,6 +301,14 @@ impl<'a> Names<'a> {
         all.into_iter()
     }
 
+    /// The declarations of a kind in the modules that the user's files use, directly or through others.
+    pub fn in_use(&self, is: fn(&ItemKind) -> bool) -> impl Iterator<Item = &Decl<'a>> {
+        let all = self.decls.iter().filter(move |decl| is(&decl.item.kind));
+        // A file without any pays nothing for the question.
+        let used = if all.clone().next().is_some() { used(self.modules) } else { Vec::new() };
+        all.filter(move |decl| used.get(decl.module) == Some(&true))
+    }
+
     /// What a module itself declares, in the order of its text.
     pub fn declared_by(&self, module: usize) -> impl Iterator<Item = DeclId> + '_ {
         self.decls.iter().enumerate().filter(move |(_, d)| d.module == module).map(|(i, _)| DeclId(i as u32))

@@ -45,13 +45,6 @@ pub struct Interactions {
     pub each: Vec<Interaction>,
 }
 
-impl Interactions {
-    /// How many numbers an interaction of members with these charges has: b0, b1, b2 and C0, or a single one.
-    pub fn numbers(charges: &[f64]) -> usize {
-        if matches!(charges, [a, b] if a * b < 0.0) { 4 } else { 1 }
-    }
-}
-
 /// What a pair or three are to each other.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
@@ -69,6 +62,13 @@ enum Kind {
     Three([usize; 3]),
 }
 
+impl Kind {
+    /// How many numbers it has: b0, b1, b2 and C0, or a single one.
+    fn numbers(self) -> usize {
+        if matches!(self, Kind::Opposite { .. }) { 4 } else { 1 }
+    }
+}
+
 /// The law of Pitzer for the members of a system.
 #[derive(Clone, Debug)]
 pub(super) struct Virial {
@@ -81,8 +81,8 @@ pub(super) struct Virial {
     kinds: Vec<Kind>,
     /// By kind: its first number.
     first: Vec<usize>,
-    /// By number: the kind, and which of its numbers.
-    of_number: Vec<(usize, usize)>,
+    /// How many numbers there are.
+    count: usize,
     /// Charges that occur, and by placed member which it has.
     classes: Vec<f64>,
     class_of: Vec<usize>,
@@ -131,7 +131,7 @@ impl Virial {
         let placed: Vec<usize> = (0..written.members.len()).filter(|i| is_solute(*i) && acts(*i)).collect();
         let charges: Vec<f64> = placed.iter().map(|i| written.members[*i].charge).collect();
         let place = |i: &usize| placed.iter().position(|p| p == i);
-        let (mut kinds, mut first, mut of_number) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut kinds, mut first, mut count) = (Vec::new(), Vec::new(), 0);
         for interaction in each {
             let of: Vec<usize> = interaction.members.iter().map(place).collect::<Option<_>>()?;
             let kind = match *of.as_slice() {
@@ -144,9 +144,8 @@ impl Virial {
                 [a, b, c] => Kind::Three([a, b, c]),
                 _ => return None,
             };
-            first.push(of_number.len());
-            let of: Vec<f64> = of.iter().map(|k| charges[*k]).collect();
-            of_number.extend((0..Interactions::numbers(&of)).map(|which| (kinds.len(), which)));
+            first.push(count);
+            count += kind.numbers();
             kinds.push(kind);
         }
         let mut classes: Vec<f64> = charges.iter().copied().filter(|z| *z != 0.0).collect();
@@ -155,12 +154,12 @@ impl Virial {
         // What has no charge is of none.
         let class_of = charges.iter().map(|z| classes.iter().position(|c| c == z).unwrap_or(usize::MAX)).collect();
         let place_of = (0..written.members.len()).map(|i| place(&i)).collect();
-        Some(Virial { spread: *spread, placed, place_of, charges, kinds, first, of_number, classes, class_of })
+        Some(Virial { spread: *spread, placed, place_of, charges, kinds, first, count, classes, class_of })
     }
 
     /// How many numbers it takes.
     pub(super) fn count(&self) -> usize {
-        self.of_number.len()
+        self.count
     }
 
     /// Where a member stands among those that are placed.

@@ -109,15 +109,20 @@ fn solids_appear_and_vanish() {
     assert!((lime.ph() - 9.9).abs() < 0.1, "{}", lime.ph());
 }
 
-/// A mixture of everything, scaled from nanomoles to kilomoles.
-fn random(seed: u64) -> Mixture {
+/// Numbers between 0 and 1 that follow from a seed.
+fn draws(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut draw = move || {
+    move || {
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
         (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    }
+}
+
+/// A mixture of everything, scaled from nanomoles to kilomoles.
+fn random(seed: u64) -> Mixture {
+    let mut draw = draws(seed);
     let mut mixture = acids().build();
     let size = 10f64.powf(draw() * 12.0 - 9.0);
     let layout = mixture.system.layout();

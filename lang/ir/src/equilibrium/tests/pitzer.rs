@@ -112,13 +112,7 @@ fn salts_dissolve_as_measured_alone_and_together() {
 
 /// A mixture of everything, drawn by a seed; each third with its heat.
 fn drawn(seed: u64) -> Mixture {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut draw = move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut draw = draws(seed);
     let mut most = || 10f64.powf(draw() * 4.0 - 3.0);
     let [na, k, mg, cl, so4, co2] = std::array::from_fn(|_| most());
     let charge = na + k + 2.0 * mg - cl - 2.0 * so4;
