@@ -605,6 +605,8 @@ pub struct EmitArgs {
 pub enum Foreign {
     /// A database of PHREEQC, as `phreeqc.dat` or `wateq4f.dat`: equilibria in water, with activity coefficients.
     Phreeqc,
+    /// The analysis of a protocol for the OT-2 (`opentrons analyze --json-output`), or a JSON protocol: a lab, and a workflow with loops.
+    Opentrons,
 }
 
 /// `matterixc import`.

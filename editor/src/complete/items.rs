@@ -77,8 +77,8 @@ const GEOMETRY: &[&str] = &["shape", "room", "mesh", "collision", "inertia"];
 
 /// Clauses of a skill or command.
 const CLAUSES: &[&str] = &[
-    "needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips", "frees",
-    "leads",
+    "needs", "presumes", "warns", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips",
+    "frees", "leads",
 ];
 
 /// Lines of a study or a fit.

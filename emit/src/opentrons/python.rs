@@ -22,11 +22,21 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
         }
     }
     let mut said: Option<Span> = None;
-    for command in &protocol.commands {
+    let mut commands = protocol.commands.iter().peekable();
+    while let Some(command) = commands.next() {
         if said != Some(command.at) {
             said = Some(command.at);
             let (file, line, text) = place::line(protocol.subject.sources, command.at);
             script.line(&format!("# {file}:{line}: {text}"));
+        }
+        // One call brings a module to a temperature and waits for it.
+        let waits = |next: &&Command| {
+            next.name == "temperatureModule/waitForTemperature" && next.text("moduleId") == command.text("moduleId")
+        };
+        if command.name == "temperatureModule/setTargetTemperature" && commands.next_if(waits).is_some() {
+            let celsius = shown(command.params.get("celsius"));
+            script.line(&format!("{}.set_temperature({celsius})", command.text("moduleId")));
+            continue;
         }
         if !script.call(command) {
             found.push(no_call(command));
@@ -72,6 +82,13 @@ impl Script {
         let name = quoted(&protocol.subject.program.plan.workflow);
         if !protocol.definitions.is_empty() {
             self.text.push_str("import json\n\n");
+        }
+        let is_aside = |c: &Command| {
+            let offset = |axis: &str| c.params.get("wellLocation").and_then(|l| l["offset"][axis].as_f64());
+            ["x", "y"].iter().any(|axis| offset(axis).is_some_and(|off| off != 0.0))
+        };
+        if protocol.commands.iter().any(is_aside) {
+            self.text.push_str("from opentrons.types import Point\n\n");
         }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
         let _ = writeln!(
@@ -144,6 +161,7 @@ impl Script {
         let (pipette, module) = (text("pipetteId"), text("moduleId"));
         let well = format!("{}[{}]", text("labwareId"), quoted(text("wellName")));
         let spot = spot(command, &well);
+        let offset = |axis: &str| shown(command.params.get("wellLocation").map(|location| &location["offset"][axis]));
         let aimed = self.aimed.take();
         match command.name {
             "pickUpTip" => self.line(&format!("{pipette}.pick_up_tip({spot})")),
@@ -159,6 +177,35 @@ impl Script {
                 self.rate(command, "blow_out");
                 self.line(&format!("{pipette}.blow_out({spot})"));
             }
+            "aspirateInPlace" => {
+                self.rate(command, "aspirate");
+                self.line(&format!("{pipette}.aspirate({})", number("volume")));
+            }
+            "touchTip" if [offset("x"), offset("y")].iter().all(|off| off == "0") => self.line(&format!(
+                "{pipette}.touch_tip({well}, radius={}, v_offset={}, speed={})",
+                number("radius"),
+                offset("z"),
+                number("speed")
+            )),
+            "moveToWell" => {
+                let direct = command.params.get("forceDirect") == Some(&Value::Bool(true));
+                let direct = if direct { ", force_direct=True" } else { "" };
+                let speed =
+                    command.params.get("speed").map_or(String::new(), |v| format!(", speed={}", shown(Some(v))));
+                self.line(&format!("{pipette}.move_to({spot}{direct}{speed})"));
+            }
+            "home" => self.line("protocol.home()"),
+            "setRailLights" => {
+                let on = command.params.get("on") == Some(&Value::Bool(true));
+                self.line(&format!("protocol.set_rail_lights({})", if on { "True" } else { "False" }));
+            }
+            "temperatureModule/setTargetTemperature" => {
+                self.line(&format!("{module}.start_set_temperature({})", number("celsius")));
+            }
+            "temperatureModule/deactivate" => self.line(&format!("{module}.deactivate()")),
+            "magneticModule/engage" => self.line(&format!("{module}.engage(height_from_base={})", number("height"))),
+            "magneticModule/disengage" => self.line(&format!("{module}.disengage()")),
+            "heaterShaker/waitForTemperature" => self.line(&format!("{module}.wait_for_temperature()")),
             "dropTip" => self.line(&format!("{pipette}.drop_tip({spot})")),
             "moveToAddressableAreaForDropTip" if text("addressableAreaName") == "fixedTrash" => {
                 self.aimed = Some(pipette.to_owned());
@@ -198,11 +245,11 @@ impl Script {
 /// A place in a well.
 fn spot(command: &Command, well: &str) -> String {
     let Some(location) = command.params.get("wellLocation") else { return well.to_owned() };
-    let z = location["offset"]["z"].as_f64().unwrap_or(0.0);
-    let z = shown(Some(&z.into()));
-    match location["origin"].as_str() {
+    let [x, y, z] = ["x", "y", "z"].map(|axis| shown(Some(&location["offset"][axis].as_f64().unwrap_or(0.0).into())));
+    let place = match location["origin"].as_str() {
         Some("bottom") => format!("{well}.bottom({z})"),
         Some("center") => format!("{well}.center()"),
         _ => format!("{well}.top({z})"),
-    }
+    };
+    if x == "0" && y == "0" { place } else { format!("{place}.move(Point({x}, {y}, 0))") }
 }

@@ -44,6 +44,7 @@ impl Writer<'_, '_> {
         };
         let (robot, at) = (self.protocol.robot.device, self.protocol.subject.program.scene.get(wired.device).span);
         let here = match message.form.about {
+            About::Robot => true,
             About::Pipette => belongs(self.protocol.subject, wired.device, robot),
             About::Labware | About::Module => message.get("location").is_some_and(|l| self.deck.location(l).is_some()),
             About::Well => self.deck.well(wired.device).is_some() && message.get("volume") != Some("0"),
@@ -110,6 +111,7 @@ impl Writer<'_, '_> {
         let mut params = Map::new();
         let own = self.deck.get(device).map(|l| l.id.clone()).unwrap_or_default();
         match message.form.about {
+            About::Robot => {}
             About::Pipette => drop(params.insert("pipetteId".to_owned(), own.into())),
             About::Module => drop(params.insert("moduleId".to_owned(), own.into())),
             About::Labware => drop(params.insert("labwareId".to_owned(), own.into())),
@@ -126,6 +128,12 @@ impl Writer<'_, '_> {
             match holds {
                 Holds::Text => drop(params.insert(key, value.as_str().into())),
                 Holds::Number => drop(params.insert(key, parsed(message, name, value)?.into())),
+                Holds::Given => {
+                    let value = parsed(message, name, value)?;
+                    if value != 0.0 {
+                        params.insert(key, value.into());
+                    }
+                }
                 Holds::Flag => drop(params.insert(key, flag(message, name, value)?.into())),
                 Holds::Well => {
                     let (labware, well) = self.well(message, value, at)?;
@@ -136,9 +144,11 @@ impl Writer<'_, '_> {
                     drop(spot.insert("origin".to_owned(), value.as_str().into()))
                 }
                 Holds::Origin => return Err(message.wrong(format!("`{value}` is no place in a well"))),
-                Holds::Height => drop(
-                    spot.insert("offset".to_owned(), json!({ "x": 0, "y": 0, "z": parsed(message, name, value)? })),
-                ),
+                Holds::Offset => {
+                    let offset = spot.entry("offset").or_insert_with(|| json!({ "x": 0, "y": 0, "z": 0 }));
+                    // None is not less than none.
+                    offset[*name] = (parsed(message, name, value)? + 0.0).into();
+                }
                 Holds::Location => drop(params.insert(
                     key,
                     match self.deck.location(value) {

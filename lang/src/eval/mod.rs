@@ -76,6 +76,12 @@ impl Scope {
         1 << position.min(63)
     }
 
+    /// Notes what was read of its locals in a scope that began as a copy of this one.
+    pub fn note_reads_of(&self, inner: &Scope) {
+        let own = (0..self.vars.len()).fold(0, |bits, at| bits | Self::read_bit(at));
+        self.reads.set(self.reads.get() | inner.reads.get() & own);
+    }
+
     /// Adds a local.
     pub fn bind(&mut self, name: impl Into<String>, value: Value) {
         self.vars.push((name.into(), value));

@@ -474,6 +474,7 @@ impl<'a> Planner<'a, '_> {
             }
             let group = sig.labelled.iter().find(|(l, _)| l.text == label.text);
             match group.map(|(_, params)| params.as_slice()) {
+                Some([p]) if p.of.is_some() => {}
                 Some([p]) => good &= self.argument_of(p, e, module, scope, &mut values),
                 Some(params) => match &*e.kind {
                     ExprKind::Tuple(items, None) if items.len() == params.len() => {
@@ -505,6 +506,7 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             match &p.default {
+                Some(_) if p.of.is_some() => {}
                 Some(_) if params.iter().all(|p| p.default.is_some()) => {
                     for (p, e) in params.iter().filter_map(|p| Some((p, p.default.as_ref()?))) {
                         good &= self.argument_of(p, e, module, &mut Scope::module(module), &mut values);
@@ -527,8 +529,49 @@ impl<'a> Planner<'a, '_> {
                 }
             }
         }
+        // Behind the others, as they may name functions of what another argument is.
+        for (label, params) in &sig.labelled {
+            let [p @ Param { of: Some(of), .. }] = params.as_slice() else { continue };
+            let given = call.labelled.iter().find(|(l, _)| l.text == label.text).map(|(_, e)| e);
+            let thing = values.iter().find(|(name, _)| *name == of.text).map(|(_, value)| value.clone());
+            good &= match (given, &p.default) {
+                (Some(e), _) => self.argument_about(p, e, module, thing, scope, &mut values),
+                (None, Some(e)) => self.argument_about(p, e, module, thing, &mut Scope::module(module), &mut values),
+                (None, None) => true,
+            };
+        }
         good &= self.options(&what, clauses, module, &call.options, call.span, scope, &mut values);
         good.then_some(Bound { values })
+    }
+
+    /// An argument in which the names of functions of one thing stand for what they are of that: `bottom + 2 mm` of a well.
+    fn argument_about(
+        &mut self,
+        p: &'a Param,
+        e: &'a Expr,
+        module: usize,
+        thing: Option<Value>,
+        scope: &mut Scope,
+        out: &mut Vec<(String, Value)>,
+    ) -> bool {
+        let mut inner = scope.clone();
+        let first = match thing {
+            Some(Value::List(all)) => all.first().cloned(),
+            other => other,
+        };
+        for name in crate::eval::lab::given::names_of(e) {
+            let Some(id) = self.lab.tables.names.lookup(module, name) else { continue };
+            let is_of_one =
+                matches!(&self.lab.tables.names.decl(id).item.kind, ItemKind::Fn { params, .. } if params.len() == 1);
+            if let Some(thing) = first.clone().filter(|_| is_of_one)
+                && let Some(value) = self.lab.call_with(id, vec![thing])
+            {
+                inner.bind(name, value);
+            }
+        }
+        let good = self.argument_of(p, e, module, &mut inner, out);
+        scope.note_reads_of(&inner);
+        good
     }
 
     /// The value of a pair of brackets of a signature: for several parameters a tuple of as many.
