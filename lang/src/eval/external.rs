@@ -70,6 +70,7 @@ enum Bound {
     Brink,
     /// How far below its lip a tilted vessel reaches.
     Droop,
+    StandingHeight,
     /// A number that a material states; without end where it states none.
     Stated,
     /// What the lab placed the instance on, by one of these prepositions.
@@ -175,6 +176,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("placed", Bound::Placed),
     ("salts", Bound::Salts),
     ("soils", Bound::Soils),
+    ("standing_height", Bound::StandingHeight),
     ("stated", Bound::Stated),
     ("max_over_time", Bound::OverTime(Keep::Largest)),
     ("min_over_time", Bound::OverTime(Keep::Smallest)),
@@ -303,6 +305,7 @@ impl Elaborator<'_> {
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Kept, [Value::Instance(i), Value::Num(tilt)]) => self.kept(*i, tilt),
             (Bound::Brink, [Value::Instance(i), Value::Num(volume)]) => self.brink(*i, volume),
+            (Bound::StandingHeight, [Value::Instance(i), Value::Num(volume)]) => self.standing_height(*i, volume),
             (Bound::Droop, [Value::Instance(i), Value::Num(tilt), Value::Num(behind)]) => self.droop(*i, tilt, behind),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
