@@ -54,7 +54,7 @@ pub fn texts(names: &Names<'_>, format: &str, loader: &dyn Loader) -> BTreeMap<S
         _ => None,
     });
     let read = named.filter_map(|(module, path)| {
-        let text = source(names.modules[module].file, format, &path.text, loader).ok()?;
+        let text = source_text(names.modules[module].file, format, &path.text, loader).ok()?;
         Some((path.text.clone(), text))
     });
     read.collect()
@@ -142,7 +142,7 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
         lines.extend(meshes);
         let Some((word, path)) = source else { continue };
         let Some(format) = FORMATS.iter().find(|f| f.word == word.text) else { continue };
-        let read = source(file, &word.text, &path.text, loader).and_then(|text| {
+        let read = source_text(file, &word.text, &path.text, loader).and_then(|text| {
             (format.read)(&text, path, &mut beside)
                 .map_err(|reason| format!("`{}` is no {}: {reason}", path.text, format.holds).into())
         });
@@ -252,7 +252,7 @@ impl Unread {
 }
 
 /// The text that an asset comes from: of labware, a definition of the library by its name; else that of a file.
-fn source(from: FileId, format: &str, path: &str, loader: &dyn Loader) -> Result<String, Unread> {
+fn source_text(from: FileId, format: &str, path: &str, loader: &dyn Loader) -> Result<String, Unread> {
     if format != "labware" {
         return Ok(text(from, path, loader)?);
     }

@@ -113,15 +113,14 @@ impl Resource {
         if turned(child) || child.children.iter().any(turned) {
             return Err(format!("`{}` is turned", child.name));
         }
-        let corner = child.corner()?;
         if child.is("well") {
-            return self.container(corner, child).map(Some);
+            return self.container(child.corner()?, child).map(Some);
         }
         if child.is("tip_spot") {
-            return self.tip(corner, child).map(Some);
+            return self.tip(child.corner()?, child).map(Some);
         }
         let Some(tube) = child.children.iter().find(|c| c.is("tube")) else { return Ok(None) };
-        let inner = tube.corner()?;
+        let (corner, inner) = (child.corner()?, tube.corner()?);
         self.container([0, 1, 2].map(|k| corner[k] + inner[k]), tube).map(Some)
     }
 
