@@ -209,7 +209,12 @@ fn labware_stands_on_labware_in_protocols() {
 ";
     write(&dir, "bench.mtx", format!("{}{steps}", STACKS.replace("LID", "")));
     let ended = matterixc_in(&dir, &["emit", "bench.mtx", "--target", "opentrons-python"]);
-    assert!(ended.out.contains("plate = block.load_labware(\"opentrons_96_wellplate_200ul_pcr_full_skirt\""), "{}{}", ended.out, ended.err);
+    assert!(
+        ended.out.contains("plate = block.load_labware(\"opentrons_96_wellplate_200ul_pcr_full_skirt\""),
+        "{}{}",
+        ended.out,
+        ended.err
+    );
     let ended = matterixc_in(&dir, &["emit", "bench.mtx", "--target", "opentrons-json"]);
     let document: Value = serde_json::from_str(&ended.out).expect("JSON");
     let commands = document["commands"].as_array().expect("commands");
