@@ -73,7 +73,7 @@ const LINES: &[(&str, &str)] = &[
 ];
 
 /// Fields of geometry that every asset may have.
-const GEOMETRY: &[&str] = &["shape", "room", "mesh", "collision", "inertia"];
+const GEOMETRY: &[&str] = &["shape", "room", "inside", "mesh", "collision", "inertia"];
 
 /// Clauses of a skill or command.
 const CLAUSES: &[&str] = &[

@@ -22,6 +22,8 @@ pub(super) enum Location {
     Slot(String),
     /// A module, by its identifier.
     Module(String),
+    /// Other labware, such as an adapter, by its identifier.
+    Labware(String),
 }
 
 /// Words of Python, and names that a protocol in Python has for itself.
@@ -98,11 +100,12 @@ impl<'p> Deck<'p> {
         id
     }
 
-    /// Where what stands on this thing stands; none where that is neither a place of this deck nor a module on it.
+    /// Where what stands on this thing stands; none where that is neither a place of this deck nor a module or labware on it.
     pub(super) fn location(&self, name: &str) -> Option<Location> {
         let support = self.scene.find(name)?;
         match self.loaded.get(&support) {
             Some(Loaded { id, about: About::Module }) => return Some(Location::Module(id.clone())),
+            Some(Loaded { id, about: About::Labware }) => return Some(Location::Labware(id.clone())),
             Some(_) => return None,
             None => {}
         }

@@ -127,7 +127,8 @@ impl Script {
             "loadLabware" => {
                 let (id, version) = (text("labwareId"), shown(command.params.get("version")));
                 let uri = format!("{}/{}/{version}", text("namespace"), text("loadName"));
-                let on = location["moduleId"].as_str().unwrap_or("protocol");
+                let below = location["moduleId"].as_str().or_else(|| location["labwareId"].as_str());
+                let on = below.unwrap_or("protocol");
                 let slot = slot(&location).map(|s| format!(", {s}")).unwrap_or_default();
                 let label = quoted(text("displayName"));
                 if protocol.definitions.iter().any(|(known, _)| *known == uri) {

@@ -154,6 +154,7 @@ impl Writer<'_, '_> {
                     match self.deck.location(value) {
                         Some(Location::Slot(slot)) => json!({ "slotName": slot }),
                         Some(Location::Module(id)) => json!({ "moduleId": id }),
+                        Some(Location::Labware(id)) => json!({ "labwareId": id }),
                         None => Value::Null,
                     },
                 )),

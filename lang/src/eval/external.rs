@@ -75,7 +75,7 @@ enum Bound {
     /// The volume that a vessel holds up to a height.
     Below,
     /// How high a volume stands in a vessel.
-    Level,
+    StandingHeight,
     /// A number that a material states; without end where it states none.
     Stated,
     /// What the lab placed the instance on, by one of these prepositions.
@@ -162,7 +162,6 @@ const TABLE: &[(&str, Bound)] = &[
     ("brink", Bound::Brink),
     ("depth", Bound::Depth),
     ("held_below", Bound::Below),
-    ("liquid_level", Bound::Level),
     ("kept", Bound::Kept),
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
@@ -184,6 +183,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("placed", Bound::Placed),
     ("salts", Bound::Salts),
     ("soils", Bound::Soils),
+    ("standing_height", Bound::StandingHeight),
     ("stated", Bound::Stated),
     ("max_over_time", Bound::OverTime(Keep::Largest)),
     ("min_over_time", Bound::OverTime(Keep::Smallest)),
@@ -312,10 +312,10 @@ impl Elaborator<'_> {
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Kept, [Value::Instance(i), Value::Num(tilt)]) => self.kept(*i, tilt),
             (Bound::Brink, [Value::Instance(i), Value::Num(volume)]) => self.brink(*i, volume),
+            (Bound::StandingHeight, [Value::Instance(i), Value::Num(volume)]) => self.standing_height(*i, volume),
             (Bound::Droop, [Value::Instance(i), Value::Num(tilt), Value::Num(behind)]) => self.droop(*i, tilt, behind),
             (Bound::Depth, [Value::Instance(i)]) => self.depth(*i),
             (Bound::Below, [Value::Instance(i), Value::Num(height)]) => self.held_below(*i, height),
-            (Bound::Level, [Value::Instance(i), Value::Num(volume)]) => self.level(*i, volume),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),

@@ -10,6 +10,7 @@ pub mod compare;
 pub mod equilibrium;
 pub mod expr;
 pub mod external;
+mod filling;
 pub mod interactions;
 pub mod lab;
 pub mod lists;

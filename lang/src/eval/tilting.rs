@@ -1,9 +1,9 @@
-//! What stays in a vessel that is tilted, how far a volume lets it tilt, and how high it stands, as the inside of its shape has it.
+//! What stays in a vessel that is tilted, and how far a volume lets it tilt, as the inside of its shape has it.
 
 use std::sync::Arc;
 
 use matterix_ir::scene::{InstanceId, Shape};
-use matterix_ir::{BinaryOp, NodeId, UnaryOp, filling, tilting};
+use matterix_ir::{BinaryOp, NodeId, UnaryOp, tilting};
 
 use super::table::{Point, lines};
 use super::{Num, Value};
@@ -111,44 +111,8 @@ impl Elaborator<'_> {
         Some(known.clone()).filter(|points| points.len() > 1)
     }
 
-    /// From the bottom of the inside of a vessel to its rim; `unlimited` where that is not known.
-    pub(super) fn depth(&mut self, id: InstanceId) -> Value {
-        match self.room_in(id) {
-            Some(inside) => self.number(filling::depth(&inside), self.tables.units.named("Length"), false),
-            None => Value::Unlimited,
-        }
-    }
-
-    /// The volume that a vessel holds up to a height above its bottom; `unlimited` where its inside is not known.
-    pub(super) fn held_below(&mut self, id: InstanceId, height: &Num) -> Value {
-        let dimension = self.tables.units.named("Volume");
-        let Some(inside) = self.room_in(id) else { return Value::Unlimited };
-        match self.graph.constant(height.node) {
-            Some(height) => self.number(filling::below(&inside, height), dimension, false),
-            None => {
-                let points = filling::levels(&inside);
-                let node = self.read_off(height.node, points.into_iter().map(|[volume, level]| [level, volume]));
-                self.num(node, dimension)
-            }
-        }
-    }
-
-    /// How high a volume stands in a vessel above its bottom; `unlimited` where its inside is not known.
-    pub(super) fn level(&mut self, id: InstanceId, volume: &Num) -> Value {
-        let Some(inside) = self.room_in(id) else { return Value::Unlimited };
-        let node = self.read_off(volume.node, filling::levels(&inside).into_iter());
-        self.num(node, self.tables.units.named("Length"))
-    }
-
-    /// What of a vessel liquid stands in, if that is known.
-    fn room_in(&mut self, id: InstanceId) -> Option<Vec<[f64; 2]>> {
-        let geometry = self.geometry(id);
-        let hollow = |shape: &Shape| matches!(shape, Shape::Turned { .. });
-        filling::inside(&geometry.room.or_else(|| geometry.shape.filter(hollow))?)
-    }
-
     /// The value of a table at a place, or at the nearer of its ends.
-    fn read_off(&mut self, x: NodeId, points: impl Iterator<Item = [f64; 2]>) -> NodeId {
+    pub(super) fn read_off(&mut self, x: NodeId, points: impl Iterator<Item = [f64; 2]>) -> NodeId {
         let table: Vec<Point> = points.map(|[x, y]| (x, self.graph.number(y))).collect();
         let [(low, _), .., (high, _)] = table[..] else { return self.graph.number(f64::NAN) };
         let [low, high] = [low, high].map(|end| self.graph.number(end));
