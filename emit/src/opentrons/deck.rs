@@ -6,6 +6,9 @@ use matterix_ir::scene::{InstanceId, Scene};
 
 use super::form::About;
 
+/// How commands call the fixed bin.
+pub(super) const BIN: &str = "fixedTrash";
+
 /// Something that has been loaded.
 #[derive(Clone, Debug)]
 pub(super) struct Loaded {
@@ -115,6 +118,11 @@ impl<'p> Deck<'p> {
     /// The identifier of the labware that a well or tip belongs to, and its name in it.
     pub(super) fn well(&self, id: InstanceId) -> Option<(String, String)> {
         let instance = self.scene.get(id);
+        let whole = instance.owner?;
+        // The bin is a part of the robot, which nothing loads.
+        if !self.loaded.contains_key(&whole) && self.scene.get(whole).owner == Some(self.robot) {
+            return Some((BIN.to_owned(), label(&instance.name).to_owned()));
+        }
         let labware = self.loaded.get(&instance.owner?).filter(|l| l.about == About::Labware)?;
         Some((labware.id.clone(), label(&instance.name).to_owned()))
     }

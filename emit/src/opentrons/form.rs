@@ -25,6 +25,10 @@ pub(super) enum Holds {
     Number,
     /// A number that is left out where it is 0.
     Given,
+    /// The mount whose axis and plunger go home.
+    Mount,
+    /// The mount whose plunger goes home.
+    Plunger,
     /// `true` or `false`.
     Flag,
     /// A place of loaded labware, or those of all channels.
@@ -108,6 +112,7 @@ const FORMS: &[Form] = &[
             ("z", Holds::Offset),
             ("forceDirect", Flag),
             ("speed", Holds::Given),
+            ("minimumZHeight", Holds::Given),
         ],
     ),
     form("aspirateInPlace", About::Pipette, &[("volume", Number), ("flowRate", Number)], &[]),
@@ -119,7 +124,16 @@ const FORMS: &[Form] = &[
         &[("alternateDropLocation", Flag)],
     ),
     form("dropTipInPlace", About::Pipette, &[], &[]),
-    form("home", About::Robot, &[], &[]),
+    form("setTipState", About::Labware, &[], &[]),
+    form("home", About::Robot, &[], &[("mount", Holds::Mount), ("plunger", Holds::Plunger)]),
+    form("thermocycler/openLid", About::Module, &[], &[]),
+    form("thermocycler/closeLid", About::Module, &[], &[]),
+    form("thermocycler/setTargetBlockTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("thermocycler/waitForBlockTemperature", About::Module, &[], &[]),
+    form("thermocycler/deactivateBlock", About::Module, &[], &[]),
+    form("thermocycler/setTargetLidTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("thermocycler/waitForLidTemperature", About::Module, &[], &[]),
+    form("thermocycler/deactivateLid", About::Module, &[], &[]),
     form("setRailLights", About::Robot, &[("on", Flag)], &[]),
     form("temperatureModule/setTargetTemperature", About::Module, &[("celsius", Number)], &[]),
     form("temperatureModule/waitForTemperature", About::Module, &[], &[]),

@@ -7,6 +7,7 @@ use matterix_ir::{Diagnostic, Span};
 use serde_json::Value;
 
 use super::WHAT;
+use super::deck::BIN;
 use super::protocol::{Command, Protocol};
 use crate::finding::not_expressible;
 use crate::place;
@@ -30,13 +31,13 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
             script.line(&format!("# {file}:{line}: {text}"));
         }
         // One call brings a module to a temperature and waits for it.
-        let waits = |next: &&Command| {
-            next.name == "temperatureModule/waitForTemperature" && next.text("moduleId") == command.text("moduleId")
-        };
-        if command.name == "temperatureModule/setTargetTemperature" && commands.next_if(waits).is_some() {
-            let celsius = shown(command.params.get("celsius"));
-            script.line(&format!("{}.set_temperature({celsius})", command.text("moduleId")));
-            continue;
+        if let Some((_, wait, call)) = TEMPERED.iter().find(|(set, ..)| *set == command.name) {
+            let waits = |next: &&Command| next.name == *wait && next.text("moduleId") == command.text("moduleId");
+            if commands.next_if(waits).is_some() {
+                let celsius = shown(command.params.get("celsius"));
+                script.line(&format!("{}.{call}({celsius})", command.text("moduleId")));
+                continue;
+            }
         }
         if !script.call(command) {
             found.push(no_call(command));
@@ -44,6 +45,13 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
     }
     if found.is_empty() { Ok(script.text.into_bytes()) } else { Err(found) }
 }
+
+/// A set point, the wait that follows, and the call that is both.
+const TEMPERED: [(&str, &str, &str); 3] = [
+    ("temperatureModule/setTargetTemperature", "temperatureModule/waitForTemperature", "set_temperature"),
+    ("thermocycler/setTargetBlockTemperature", "thermocycler/waitForBlockTemperature", "set_block_temperature"),
+    ("thermocycler/setTargetLidTemperature", "thermocycler/waitForLidTemperature", "set_lid_temperature"),
+];
 
 fn no_call(command: &Command) -> Diagnostic {
     not_expressible(command.at, format!("{WHAT} in Python has no call for `{}`", command.name), "is told this")
@@ -191,11 +199,26 @@ impl Script {
             "moveToWell" => {
                 let direct = command.params.get("forceDirect") == Some(&Value::Bool(true));
                 let direct = if direct { ", force_direct=True" } else { "" };
-                let speed =
-                    command.params.get("speed").map_or(String::new(), |v| format!(", speed={}", shown(Some(v))));
-                self.line(&format!("{pipette}.move_to({spot}{direct}{speed})"));
+                let given = |key: &str, name: &str| {
+                    command.params.get(key).map_or(String::new(), |v| format!(", {name}={}", shown(Some(v))))
+                };
+                let (speed, clear) = (given("speed", "speed"), given("minimumZHeight", "minimum_z_height"));
+                self.line(&format!("{pipette}.move_to({spot}{direct}{clear}{speed})"));
             }
-            "home" => self.line("protocol.home()"),
+            "setTipState" => self.line(&format!("{}.reset()", text("labwareId"))),
+            "home" => match command.params.get("axes").and_then(Value::as_array) {
+                None => self.line("protocol.home()"),
+                Some(axes) => {
+                    let axis = axes.first().and_then(Value::as_str).unwrap_or_default();
+                    let call = if axes.len() == 1 { "home_plunger" } else { "home" };
+                    let mount = axis.trim_end_matches("Plunger").trim_end_matches('Z');
+                    self.line(&format!("protocol.loaded_instruments[{}].{call}()", quoted(mount)));
+                }
+            },
+            "thermocycler/openLid" => self.line(&format!("{module}.open_lid()")),
+            "thermocycler/closeLid" => self.line(&format!("{module}.close_lid()")),
+            "thermocycler/deactivateBlock" => self.line(&format!("{module}.deactivate_block()")),
+            "thermocycler/deactivateLid" => self.line(&format!("{module}.deactivate_lid()")),
             "setRailLights" => {
                 let on = command.params.get("on") == Some(&Value::Bool(true));
                 self.line(&format!("protocol.set_rail_lights({})", if on { "True" } else { "False" }));
@@ -243,8 +266,11 @@ impl Script {
     }
 }
 
-/// A place in a well.
+/// A place in a well, or the bin.
 fn spot(command: &Command, well: &str) -> String {
+    if command.text("labwareId") == BIN {
+        return "protocol.fixed_trash".to_owned();
+    }
     let Some(location) = command.params.get("wellLocation") else { return well.to_owned() };
     let [x, y, z] = ["x", "y", "z"].map(|axis| shown(Some(&location["offset"][axis].as_f64().unwrap_or(0.0).into())));
     let place = match location["origin"].as_str() {

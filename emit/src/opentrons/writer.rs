@@ -94,7 +94,7 @@ impl Writer<'_, '_> {
             };
             return self.found.push(d);
         };
-        if self.deck.get(device).is_none() {
+        if self.deck.get(device).is_none() && device != self.protocol.robot.device {
             let headline = format!("`{}` is no part of `{}`", self.name(device), self.name(self.protocol.robot.device));
             return self.found.push(not_expressible(at, headline, format!("does `{}`", step.label)));
         }
@@ -128,6 +128,10 @@ impl Writer<'_, '_> {
             match holds {
                 Holds::Text => drop(params.insert(key, value.as_str().into())),
                 Holds::Number => drop(params.insert(key, parsed(message, name, value)?.into())),
+                Holds::Mount => {
+                    drop(params.insert("axes".to_owned(), json!([format!("{value}Z"), format!("{value}Plunger")])))
+                }
+                Holds::Plunger => drop(params.insert("axes".to_owned(), json!([format!("{value}Plunger")]))),
                 Holds::Given => {
                     let value = parsed(message, name, value)?;
                     if value != 0.0 {

@@ -1,6 +1,7 @@
 //! What stands on the deck: names for it, and what of its definitions a protocol needs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 
 use serde_json::Value;
 
@@ -26,6 +27,10 @@ pub(super) enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Well {
     pub(super) depth: f64,
+    /// Of its opening, mm2.
+    area: f64,
+    /// What it holds, uL.
+    capacity: f64,
     x: f64,
     y: f64,
 }
@@ -100,7 +105,7 @@ impl Deck {
                 let asset = library.module(model).ok_or_else(|| format!("the library has no module `{model}`"))?;
                 let name = words::name_of(module_word(model), "module", &mut self.names);
                 self.used.insert(asset.to_owned());
-                let slot = slot(&command.params["location"]).unwrap_or_default();
+                let slot = slot(&command.params["location"]).unwrap_or_else(|| "7".to_owned());
                 let id = command.loaded("moduleId").unwrap_or(model).to_owned();
                 self.loaded.push(id.clone());
                 self.modules.insert(id, Module { name, asset: asset.to_owned(), slot });
@@ -197,6 +202,19 @@ impl Deck {
         }
     }
 
+    /// What a well takes, uL.
+    pub(super) fn capacity(&self, labware: &str, well: &str) -> f64 {
+        let labware = self.labware.values().find(|known| known.name == labware);
+        labware.and_then(|labware| labware.wells.get(well)).map_or(0.0, |well| well.capacity)
+    }
+
+    /// What the first well of a place holds up to a height, uL: as if it were as wide as its opening, and no more than it takes.
+    pub(super) fn held_below(&self, place: &Place, height: f64) -> f64 {
+        let labware = self.labware.values().find(|labware| labware.name == place.of);
+        let well = self.wells_of(place).first().and_then(|name| labware?.wells.get(name));
+        well.map_or(0.0, |well| (well.area * height.max(0.0)).min(well.capacity))
+    }
+
     /// Wells of a place.
     pub(super) fn wells_of(&self, place: &Place) -> Vec<String> {
         match &place.at {
@@ -218,7 +236,17 @@ fn slot(location: &Value) -> Option<String> {
 fn wells(definition: &Value) -> BTreeMap<String, Well> {
     let Some(all) = definition["wells"].as_object() else { return BTreeMap::new() };
     let number = |well: &Value, key: &str| well[key].as_f64().unwrap_or(0.0);
-    let read = |well: &Value| Well { depth: number(well, "depth"), x: number(well, "x"), y: number(well, "y") };
+    let area = |well: &Value| match well["diameter"].as_f64() {
+        Some(diameter) => PI * diameter * diameter / 4.0,
+        None => number(well, "xDimension") * number(well, "yDimension"),
+    };
+    let read = |well: &Value| Well {
+        depth: number(well, "depth"),
+        area: area(well),
+        capacity: number(well, "totalLiquidVolume"),
+        x: number(well, "x"),
+        y: number(well, "y"),
+    };
     all.iter().map(|(name, well)| (name.clone(), read(well))).collect()
 }
 

@@ -2,25 +2,73 @@
 
 use std::collections::BTreeMap;
 
+/// A well by labware and name.
+pub(super) type Name = (String, String);
+
+/// A well, uL.
+#[derive(Clone, Copy, Debug, Default)]
+struct Well {
+    /// What came in less what went out.
+    net: f64,
+    /// The least that it ever was.
+    least: f64,
+    /// What must be there at the start so that tips reached the liquid.
+    wet: f64,
+    /// Whether something left it before anything came: it is a source, and was not filled on the way.
+    is_source: bool,
+}
+
 /// What is in wells, beyond what was there at the start, and in tips.
 #[derive(Debug, Default)]
 pub(super) struct Liquids {
-    /// By labware and well: what came in less what went out, and the least that it ever was, uL.
-    wells: BTreeMap<(String, String), (f64, f64)>,
+    /// What wells hold at the start, where that is known, uL.
+    initial: Option<BTreeMap<Name, f64>>,
+    wells: BTreeMap<Name, Well>,
     /// By pipette: liquid and air in each tip, uL.
     tips: BTreeMap<String, (f64, f64)>,
 }
 
 impl Liquids {
+    /// Wells that hold so much at the start, uL.
+    pub(super) fn with(initial: BTreeMap<Name, f64>) -> Liquids {
+        Liquids { initial: Some(initial), ..Liquids::default() }
+    }
+
     /// The tips of a pipette hold nothing.
     pub(super) fn empty(&mut self, pipette: &str) {
         self.tips.remove(pipette);
     }
 
-    /// Each tip aspirates so much.
-    pub(super) fn aspirate(&mut self, pipette: &str, volume: f64, channels: usize, labware: &str, wells: &[String]) {
-        self.tips.entry(pipette.to_owned()).or_default().0 += volume;
-        self.add(labware, wells, -volume * channels as f64);
+    /// Each tip aspirates so much, at a height up to which a well holds `below`; whether the wells hold less.
+    pub(super) fn aspirate(
+        &mut self,
+        pipette: &str,
+        volume: f64,
+        (channels, below): (usize, f64),
+        labware: &str,
+        wells: &[String],
+    ) -> bool {
+        let each = volume * channels as f64 / wells.len().max(1) as f64;
+        let (mut taken, mut lacks) = (0.0_f64, false);
+        for well in wells {
+            let name = (labware.to_owned(), well.clone());
+            let initial = self.initial.as_ref().map(|initial| initial.get(&name).copied().unwrap_or(0.0));
+            let is_new = !self.wells.contains_key(&name);
+            let well = self.wells.entry(name).or_default();
+            well.is_source |= is_new;
+            well.wet = well.wet.max(below - well.net);
+            // What rounding left counts as there.
+            let there = initial.map_or(each, |initial| (initial + well.net) * (1.0 + 1e-9));
+            let here = each.min(there.max(0.0));
+            lacks |= here < each;
+            taken = taken.max(here);
+            well.net -= here;
+            well.least = well.least.min(well.net);
+        }
+        let tip = self.tips.entry(pipette.to_owned()).or_default();
+        let liquid = taken * wells.len() as f64 / channels as f64;
+        tip.0 += liquid;
+        lacks
     }
 
     /// Each tip aspirates so much air.
@@ -35,26 +83,27 @@ impl Liquids {
         *air -= blown;
         let given = (volume - blown).min(*liquid);
         *liquid -= given;
-        self.add(labware, wells, given * channels as f64);
+        self.fill(labware, wells, given * channels as f64);
     }
 
     /// Each tip gives off what it holds.
     pub(super) fn blow_out(&mut self, pipette: &str, channels: usize, labware: &str, wells: &[String]) {
         let (liquid, _) = self.tips.remove(pipette).unwrap_or_default();
-        self.add(labware, wells, liquid * channels as f64);
+        self.fill(labware, wells, liquid * channels as f64);
     }
 
-    fn add(&mut self, labware: &str, wells: &[String], volume: f64) {
+    fn fill(&mut self, labware: &str, wells: &[String], volume: f64) {
         for well in wells {
-            let (net, least) = self.wells.entry((labware.to_owned(), well.clone())).or_default();
-            *net += volume / wells.len() as f64;
-            *least = least.min(*net);
+            let well = self.wells.entry((labware.to_owned(), well.clone())).or_default();
+            well.net += volume / wells.len() as f64;
         }
     }
 
-    /// What wells must hold at the start, uL, by labware and well.
-    pub(super) fn needed(&self) -> impl Iterator<Item = (&(String, String), f64)> {
-        self.wells.iter().map(|(well, (_, least))| (well, -least)).filter(|(_, needed)| *needed > 1e-9)
+    /// What sources must hold at the start, uL, by labware and well: what leaves them, and, rounded up, what tips must reach.
+    pub(super) fn needed(&self) -> impl Iterator<Item = (&Name, f64)> {
+        let needed = |well: &Well| if well.wet > -well.least { well.wet.ceil() } else { -well.least };
+        let is_short = |well: &Well| well.is_source && -well.least > 1e-9;
+        self.wells.iter().filter(move |(_, well)| is_short(well)).map(move |(name, well)| (name, needed(well)))
     }
 }
 
@@ -62,16 +111,30 @@ impl Liquids {
 mod tests {
     use super::*;
 
+    fn well(name: &str) -> Vec<String> {
+        vec![name.to_owned()]
+    }
+
     #[test]
-    fn a_well_must_hold_what_leaves_before_something_comes() {
+    fn a_source_must_hold_what_leaves_it() {
         let mut liquids = Liquids::default();
-        let well = |name: &str| vec![name.to_owned()];
-        liquids.aspirate("p", 50.0, 1, "plate", &well("A1"));
+        liquids.aspirate("p", 50.0, (1, 10.0), "plate", &well("A1"));
         liquids.air("p", 10.0);
         liquids.dispense("p", 60.0, 1, "plate", &well("B1"));
-        liquids.aspirate("p", 70.0, 1, "plate", &well("B1"));
-        liquids.blow_out("p", 1, "plate", &well("A1"));
+        // More than there is: the rest is air.
+        liquids.aspirate("p", 70.0, (1, 75.5), "plate", &well("B1"));
+        liquids.aspirate("p", 1.0, (1, 75.5), "plate", &well("C1"));
         let needed: Vec<(String, f64)> = liquids.needed().map(|((_, well), v)| (well.clone(), v)).collect();
-        assert_eq!(needed, [("A1".to_owned(), 50.0), ("B1".to_owned(), 20.0)]);
+        assert_eq!(needed, [("A1".to_owned(), 50.0), ("C1".to_owned(), 76.0)]);
+    }
+
+    #[test]
+    fn what_lacks_is_air() {
+        let initial = BTreeMap::from([(("plate".to_owned(), "A1".to_owned()), 100.0)]);
+        let mut liquids = Liquids::with(initial);
+        assert!(!liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
+        assert!(liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
+        liquids.dispense("p", 120.0, 1, "plate", &well("B1"));
+        assert!(!liquids.aspirate("p", 100.0, (1, 0.0), "plate", &well("B1")));
     }
 }

@@ -21,6 +21,7 @@ use crate::{Imported, LeftOut, Mistake};
 use analysis::{Analysis, Command};
 use deck::{Deck, Kind};
 use library::Library;
+use liquids::Liquids;
 use node::{cell, folded};
 use steps::Steps;
 use words::number;
@@ -46,18 +47,16 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
         }
     }
     let flows = flows(&analysis, &deck);
-    let mut steps = Steps::new(&analysis, &deck, flows.clone());
-    let is_step = |c: &Command| !c.command_type.starts_with("load");
-    // The robot begins at home by itself.
-    let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);
-    for (index, command) in analysis.commands.iter().enumerate().skip(first).filter(|(_, c)| is_step(c)) {
-        steps.take(index + 1, command);
-    }
+    // Once to see what wells must hold, and again with that.
+    let tried = steps(&analysis, &deck, &flows, Liquids::default());
+    let holding = holding(&tried, &analysis.commands, &deck);
+    let initial = holding.iter().map(|(well, (volume, _))| (well.clone(), *volume)).collect();
+    let mut steps = steps(&analysis, &deck, &flows, Liquids::with(initial));
     left_out.append(&mut steps.left_out);
     left_out.sort_by_key(|left| left.line);
-    let holding = holding(&steps, &analysis.commands);
     let nodes = std::mem::take(&mut steps.nodes);
-    let text = Page { deck: &deck, flows: &flows, holding: &holding }.text(&analysis, title, &folded(nodes));
+    let page = Page { deck: &deck, flows: &flows, holding: &holding, parked: &parked(&analysis) };
+    let text = page.text(&analysis, title, &folded(nodes));
     let text = format(FileId(0), &text).map_err(|found| {
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
         Mistake { line: 0, why: format!("the text made of it cannot be read: {why}") }
@@ -83,15 +82,43 @@ fn flows(analysis: &Analysis, deck: &Deck) -> BTreeMap<String, [f64; 3]> {
     out
 }
 
+/// Racks into which tips are dropped before any is taken from there.
+fn parked(analysis: &Analysis) -> BTreeSet<String> {
+    let mut touched: BTreeMap<&str, bool> = BTreeMap::new();
+    for command in &analysis.commands {
+        if matches!(command.command_type.as_str(), "pickUpTip" | "dropTip") {
+            touched.entry(command.text("labwareId")).or_insert(command.command_type == "dropTip");
+        }
+    }
+    touched.into_iter().filter(|(_, is_parked)| *is_parked).map(|(id, _)| id.to_owned()).collect()
+}
+
+/// All commands as steps.
+fn steps<'a>(
+    analysis: &'a Analysis,
+    deck: &'a Deck,
+    flows: &BTreeMap<String, [f64; 3]>,
+    liquids: Liquids,
+) -> Steps<'a> {
+    let mut steps = Steps::new(analysis, deck, flows.clone(), liquids);
+    let is_step = |c: &Command| !c.command_type.starts_with("load");
+    // The robot begins at home by itself.
+    let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);
+    for (index, command) in analysis.commands.iter().enumerate().skip(first).filter(|(_, c)| is_step(c)) {
+        steps.take(index + 1, command);
+    }
+    steps
+}
+
 /// What a well holds at the start: volume in uL, and what of.
 type Holding = BTreeMap<(String, String), (f64, String)>;
 
-fn holding(steps: &Steps<'_>, commands: &[Command]) -> Holding {
+/// What the protocol says that wells hold; else, of sources, what they need, as far as it fits in.
+fn holding(steps: &Steps<'_>, commands: &[Command], deck: &Deck) -> Holding {
     let mut out = steps.loaded(commands);
     for (well, needed) in steps.liquids.needed() {
-        let held = out.entry(well.clone()).or_insert((0.0, "water".to_owned()));
-        // What rounding left counts as there.
-        held.0 = if needed > held.0 * (1.0 + 1e-9) { needed } else { held.0 };
+        let most = deck.capacity(&well.0, &well.1);
+        out.entry(well.clone()).or_insert_with(|| (needed.min(most), "water".to_owned()));
     }
     out
 }
@@ -101,6 +128,8 @@ struct Page<'p> {
     deck: &'p Deck,
     flows: &'p BTreeMap<String, [f64; 3]>,
     holding: &'p Holding,
+    /// Racks that begin without tips: others are parked there.
+    parked: &'p BTreeSet<String>,
 }
 
 impl Page<'_> {
@@ -170,7 +199,11 @@ impl Page<'_> {
                 Kind::Tips => String::new(),
                 Kind::Wells => self.held(labware, liquids),
             };
-            let _ = writeln!(out, "{} = {} on {}{holding}", labware.name, labware.asset, labware.on);
+            let emptied = match self.parked.contains(id) {
+                true => format!(" {{ emptied: {} }}", labware.wells.len()),
+                false => String::new(),
+            };
+            let _ = writeln!(out, "{} = {}{emptied} on {}{holding}", labware.name, labware.asset, labware.on);
         }
     }
 

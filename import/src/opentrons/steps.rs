@@ -34,6 +34,8 @@ pub(super) struct Steps<'a> {
     moved: BTreeMap<String, (String, String, f64)>,
     /// Tips that were taken, by rack.
     taken: BTreeMap<String, BTreeSet<String>>,
+    /// Modules that shake.
+    shaking: BTreeSet<String>,
     /// The flow rates of each pipette that hold where a step says nothing, uL/s.
     flows: BTreeMap<String, [f64; 3]>,
 }
@@ -47,15 +49,21 @@ enum Flow {
 }
 
 impl<'a> Steps<'a> {
-    pub(super) fn new(analysis: &'a Analysis, deck: &'a Deck, flows: BTreeMap<String, [f64; 3]>) -> Self {
+    pub(super) fn new(
+        analysis: &'a Analysis,
+        deck: &'a Deck,
+        flows: BTreeMap<String, [f64; 3]>,
+        liquids: Liquids,
+    ) -> Self {
         Steps {
             analysis,
             deck,
             nodes: Vec::new(),
             left_out: Vec::new(),
-            liquids: Liquids::default(),
+            liquids,
             moved: BTreeMap::new(),
             taken: BTreeMap::new(),
+            shaking: BTreeSet::new(),
             flows,
         }
     }
@@ -85,6 +93,7 @@ impl<'a> Steps<'a> {
                 Ok(())
             }
             "dropTipInPlace" => self.drop(command),
+            "aspirate" | "dispense" if command.number("volume") == Some(0.0) => self.move_to(command),
             "aspirate" => self.aspirate(command),
             "dispense" => self.dispense(command),
             "blowout" => self.blow_out(command),
@@ -103,10 +112,7 @@ impl<'a> Steps<'a> {
                 self.message(command);
                 Ok(())
             }
-            "home" => match command.params["axes"].as_array() {
-                None => self.say("home ot2"),
-                Some(_) => Err("only a whole robot is sent home".to_owned()),
-            },
+            "home" => self.home(command),
             "setRailLights" => self.say(if command.params["on"] == true { "light ot2" } else { "dim ot2" }),
             "setTipState" => self.refill(command),
             name => self.module(name, command),
@@ -220,12 +226,12 @@ impl<'a> Steps<'a> {
             let options = self.options(command, Some(Flow::In), &[]);
             return self.say(format!("air gap {} uL by {by}{}", number(volume), options));
         }
-        self.liquids.aspirate(&id, volume, mounted.pipette.channels, &place.of, &self.deck.wells_of(&place));
-        let behind = format!(
-            " by {by}{}{}",
-            height(above, depth, Some(DIP - depth)),
-            self.options(command, Some(Flow::In), &[])
-        );
+        let below = self.deck.held_below(&place, above + depth);
+        let how = (mounted.pipette.channels, below);
+        let lacks = self.liquids.aspirate(&id, volume, how, &place.of, &self.deck.wells_of(&place));
+        let more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
+        let options = self.options(command, Some(Flow::In), &more);
+        let behind = format!(" by {by}{}{options}", height(above, depth, Some(DIP - depth)));
         self.nodes.push(Node::about(&format!("aspirate {} uL from ", number(volume)), place, &behind));
         self.note_place(command, above);
         Ok(())
@@ -294,8 +300,8 @@ impl<'a> Steps<'a> {
         if command.params["forceDirect"] == true {
             more.push("direct: true".to_owned());
         }
-        if command.number("minimumZHeight").is_some() {
-            return Err("it says how high the way there is at least".to_owned());
+        if let Some(clear) = command.number("minimumZHeight") {
+            more.push(format!("clear: {} mm", number(clear)));
         }
         let behind = format!("{}{}", height(above, depth, Some(0.0)), self.options(command, None, &more));
         self.nodes.push(Node::about(&format!("move {by} to "), place, &behind));
@@ -318,6 +324,22 @@ impl<'a> Steps<'a> {
         self.liquids.air(&id, volume);
         let options = self.options(command, Some(Flow::In), &[]);
         self.say(format!("air gap {} uL by {by}{options}", number(volume)))
+    }
+
+    fn home(&mut self, command: &Command) -> Result<(), String> {
+        let Some(axes) = command.params["axes"].as_array() else { return self.say("home ot2") };
+        let axes: BTreeSet<&str> = axes.iter().filter_map(Value::as_str).collect();
+        for mount in ["left", "right"] {
+            let [up, plunger] = ["Z", "Plunger"].map(|axis| format!("{mount}{axis}"));
+            if axes == BTreeSet::from([up.as_str(), plunger.as_str()]) {
+                return self.say(format!("home ot2.{mount}"));
+            }
+            if axes == BTreeSet::from([plunger.as_str()]) {
+                return self.say(format!("home plunger ot2.{mount}"));
+            }
+        }
+        let axes: Vec<&str> = axes.into_iter().collect();
+        Err(format!("the language sends a robot or a pipette home, not {}", axes.join(", ")))
     }
 
     fn refill(&mut self, command: &Command) -> Result<(), String> {
@@ -347,12 +369,23 @@ impl<'a> Steps<'a> {
                 self.say(format!("engage {name} at {} mm", number(height)))
             }
             "disengage" => self.say(format!("disengage {name}")),
+            "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
+                Err("it holds its temperature for a time".to_owned())
+            }
+            "setTargetBlockTemperature" => self.say(format!("heat {name} to {celsius} degC")),
+            "waitForBlockTemperature" => self.say(format!("settle {name}")),
+            "deactivateBlock" => self.say(format!("stop heating {name}")),
+            "setTargetLidTemperature" => self.say(format!("heat lid {name} to {celsius} degC")),
+            "waitForLidTemperature" => self.say(format!("settle lid {name}")),
+            "deactivateLid" => self.say(format!("stop heating lid {name}")),
             "openLid" => self.say(format!("open lid {name}")),
             "closeLid" => self.say(format!("close lid {name}")),
             "setAndWaitForShakeSpeed" => {
                 let rpm = command.number("rpm").ok_or("it does not say how fast")?;
+                self.shaking.insert(name.clone());
                 self.say(format!("shake {name} at {} rpm", number(rpm)))
             }
+            "deactivateShaker" if !self.shaking.remove(&name) => Err("it does not shake".to_owned()),
             "deactivateShaker" => self.say(format!("stop shaking {name}")),
             "openLabwareLatch" => self.say(format!("open latch {name}")),
             "closeLabwareLatch" => self.say(format!("close latch {name}")),

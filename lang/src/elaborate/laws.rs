@@ -423,18 +423,15 @@ impl<'a> Elaborator<'a> {
                         "rinse",
                         codes::WRONG_ARGUMENTS,
                         call.span,
-                        "`rinse` needs one vessel",
+                        "`rinse` needs one thing",
                         "rinse what?",
                     )
-                    .help("write `rinse(vessel)`"),
+                    .help("write `rinse(thing)`"),
                 );
                 return Vec::new();
             };
             return match self.expr(&arg.value, scope) {
-                Value::Instance(i) => {
-                    let mixture = self.mixture_in(i, arg.value.span);
-                    mixture.map(|m| self.rinse(m, span)).unwrap_or_default()
-                }
+                Value::Instance(i) => self.rinse(self.walls_of(i), span),
                 Value::Error => Vec::new(),
                 other => {
                     self.expected("a vessel", &other, arg.value.span);

@@ -285,19 +285,21 @@ impl<'a> Planner<'a, '_> {
         scope: &mut Scope,
     ) -> Option<Verb<'a>> {
         let mut lacking = Vec::new();
-        let mut fitting: Vec<(Verb<'a>, usize)> = Vec::new();
+        let mut fitting: Vec<(Verb<'a>, (usize, bool))> = Vec::new();
         for verb in verbs {
             match verb {
                 Verb::Skill(id) => {
-                    let ItemKind::Skill { sig, .. } = &self.lab.tables.names.decl(*id).item.kind else { continue };
-                    fitting.push((verb.clone(), misfit(sig, call, false)));
+                    let decl = self.lab.tables.names.decl(*id);
+                    let ItemKind::Skill { sig, .. } = &decl.item.kind else { continue };
+                    let other = self.is_of_other_kind(sig, decl.module, object);
+                    fitting.push((verb.clone(), (misfit(sig, call, false), other)));
                 }
                 Verb::Command(owner, m) => {
                     let MemberKind::Command { sig, .. } = &m.member.kind else { continue };
                     match self.device(sig, object, call, scope) {
                         Some(id) if self.lab.instance_is(id, *owner) => {
                             let by = !sig.params.is_empty() || object.is_none();
-                            fitting.push((verb.clone(), misfit(sig, call, by)));
+                            fitting.push((verb.clone(), (misfit(sig, call, by), false)));
                         }
                         device => lacking.push((*owner, device)),
                     }
@@ -343,6 +345,18 @@ impl<'a> Planner<'a, '_> {
         let place = format!("`{}` does not fit this", self.form(sig));
         self.lab.report(import.offered(Diagnostic::about(&text, codes::UNKNOWN_VERB, span, headline, place)));
         true
+    }
+
+    /// Whether a verb is about things of another kind than the one named.
+    fn is_of_other_kind(&mut self, sig: &'a Sig, module: usize, object: &Option<(Value, Span)>) -> bool {
+        let (Some(param), Some((Value::Instance(id) | Value::Qualified(id, _), _))) = (sig.params.first(), object)
+        else {
+            return false;
+        };
+        match param.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, module)) {
+            Some(Type::Instance { kinds, .. }) => !kinds.iter().all(|kind| self.lab.instance_is(*id, *kind)),
+            _ => false,
+        }
     }
 
     /// How badly what a verb is about fits: a quantity where a thing is expected says more than a word that is missing.
@@ -541,6 +555,13 @@ impl<'a> Planner<'a, '_> {
             };
         }
         good &= self.options(&what, clauses, module, &call.options, call.span, scope, &mut values);
+        // In the order of declaration, whatever the call's: what has been worked out for one call is known again by where arguments stand.
+        let options = clauses.iter().filter_map(|c| match &c.kind {
+            ClauseKind::Option(p) => Some(p.name.text.as_str()),
+            _ => None,
+        });
+        let declared: Vec<&str> = sig.all_params().map(|p| p.name.text.as_str()).chain(options).collect();
+        values.sort_by_key(|(name, _)| declared.iter().position(|known| known == name));
         good.then_some(Bound { values })
     }
 
