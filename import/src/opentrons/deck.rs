@@ -192,9 +192,7 @@ impl Deck {
             })
             .collect();
         let Some(reached) = reached else {
-            return Err(format!(
-                "a pipette with {channels} channels that begins at {well} of `{of}` uses fewer of them"
-            ));
+            return Err("some of its channels reach no well".to_owned());
         };
         match cell(well) {
             Some((1, number)) if reached.len() == column.len() => at(At::Column(number as usize)),

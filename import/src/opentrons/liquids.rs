@@ -18,14 +18,24 @@ struct Well {
     is_source: bool,
 }
 
+/// A tip, uL.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tip {
+    liquid: f64,
+    /// What the piston has taken up: liquid, and air.
+    drawn: f64,
+    /// Air at the end, which comes out first.
+    air: f64,
+}
+
 /// What is in wells, beyond what was there at the start, and in tips.
 #[derive(Debug, Default)]
 pub(super) struct Liquids {
     /// What wells hold at the start, where that is known, uL.
     initial: Option<BTreeMap<Name, f64>>,
     wells: BTreeMap<Name, Well>,
-    /// By pipette: liquid and air in each tip, uL.
-    tips: BTreeMap<String, (f64, f64)>,
+    /// By pipette: what each of its tips holds.
+    tips: BTreeMap<String, Tip>,
 }
 
 impl Liquids {
@@ -66,30 +76,34 @@ impl Liquids {
             well.least = well.least.min(well.net);
         }
         let tip = self.tips.entry(pipette.to_owned()).or_default();
-        let liquid = taken * wells.len() as f64 / channels as f64;
-        tip.0 += liquid;
+        tip.liquid += taken * wells.len() as f64 / channels as f64;
+        tip.drawn += volume;
+        tip.air = 0.0;
         lacks
     }
 
     /// Each tip aspirates so much air.
     pub(super) fn air(&mut self, pipette: &str, volume: f64) {
-        self.tips.entry(pipette.to_owned()).or_default().1 += volume;
+        let tip = self.tips.entry(pipette.to_owned()).or_default();
+        tip.drawn += volume;
+        tip.air += volume;
     }
 
-    /// Each tip dispenses so much: its air first.
+    /// Each tip dispenses so much: the air at its end first, then the same share of all that it holds, as `dispense` of the library does.
     pub(super) fn dispense(&mut self, pipette: &str, volume: f64, channels: usize, labware: &str, wells: &[String]) {
-        let (liquid, air) = self.tips.entry(pipette.to_owned()).or_default();
-        let blown = volume.min(*air);
-        *air -= blown;
-        let given = (volume - blown).min(*liquid);
-        *liquid -= given;
+        let tip = self.tips.entry(pipette.to_owned()).or_default();
+        let (stroke, whole) = ((volume - tip.air).max(0.0), tip.drawn - tip.air);
+        let given = if stroke * (1.0 + 1e-9) >= whole { tip.liquid } else { tip.liquid * stroke / whole };
+        tip.liquid -= given;
+        tip.drawn = (tip.drawn - volume).max(0.0);
+        tip.air = (tip.air - volume).max(0.0);
         self.fill(labware, wells, given * channels as f64);
     }
 
     /// Each tip gives off what it holds.
     pub(super) fn blow_out(&mut self, pipette: &str, channels: usize, labware: &str, wells: &[String]) {
-        let (liquid, _) = self.tips.remove(pipette).unwrap_or_default();
-        self.fill(labware, wells, liquid * channels as f64);
+        let tip = self.tips.remove(pipette).unwrap_or_default();
+        self.fill(labware, wells, tip.liquid * channels as f64);
     }
 
     fn fill(&mut self, labware: &str, wells: &[String], volume: f64) {
