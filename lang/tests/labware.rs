@@ -216,7 +216,7 @@ fn resources_of_pylabrobot_become_assets() {
     assert_eq!(place(&scene, "it0[B3]"), [38.0, -18.0, 2.0]);
     let room = |name: &str| scene.get(scene.find(name).expect(name)).room.clone();
     assert_eq!(room("it0[A1]"), Some(Shape::Box([0.034, 0.032, 0.017])));
-    assert_eq!(place(&scene, "it1[A1]"), [-49.0, 9.0, 5.0]);
+    assert_eq!(place(&scene, "it1[A1]"), [-49.0, -9.0, 5.0]);
     assert_eq!(room("it2[A1]"), Some(Shape::Box([0.12, 0.08, 0.038])));
     // A tube in its holder: 20 + 14 mm from the left, 45 + 14 mm from the front.
     assert_eq!(place(&scene, "it3[A1]"), [-29.88, 16.26, 4.5]);

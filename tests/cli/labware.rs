@@ -44,7 +44,7 @@ const PAGES: &[&str] = &[
   to use it asset NAME from labware \"geb_96_tiprack_10ul\"
 ",
     "opentrons_1_trash_850ml_fixed
-  title     Opentrons Fixed Trash
+  title     Opentrons Short Fixed Trash
   kind      Trash
   places    1 of 850 mL
   inside    straight, as wide as its opening
@@ -67,7 +67,7 @@ const PAGES: &[&str] = &[
   to use it asset NAME from labware \"opentrons_96_pcr_adapter\"
 ",
     "corning_96_wellplate_360ul_lid
-  title     Corning 96 Well Plate 360 µL Flat Lid
+  title     Corning 96 Wellplate 360ul Lid
   kind      Lid
   places    no places
   versions  1 and 2
@@ -119,7 +119,9 @@ lab l {
     mine = Mine at (0, 0, 0) m
     theirs = Theirs at (1, 0, 0) m
 }
-workflow w in l { expect mine[A1].max_volume == 80 mL and theirs[A1].max_volume == 90 mL }
+workflow w in l {
+    expect mine[A1].max_volume in 79.99 mL .. 80.01 mL and theirs[A1].max_volume in 89.99 mL .. 90.01 mL
+}
 ";
     write(&dir, "bench.mtx", bench);
     let ended = matterixc_in(&dir, &["run", "bench.mtx"]);
@@ -167,7 +169,7 @@ asset Cover from labware \"opentrons_tough_universal_lid\"
 asset Deep from labware \"nest_96_wellplate_2ml_deep\"
 lab deck {
     ambient: 22 degC
-    ot2 = OT2 at (0, 0, 0) m { left: P20Single { } }
+    ot2 = OT2 { left: P20Single { } } at (0, 0, 0) m
     tips = TipRack20 on ot2.slot[1]
     block = Block on ot2.slot[2]
     plate = PcrPlate on block holding { A1 .. A2: 100 uL of water }
@@ -214,6 +216,11 @@ fn labware_stands_on_labware_in_protocols() {
         "{}{}",
         ended.out,
         ended.err
+    );
+    assert!(
+        ended.out.contains("block = protocol.load_adapter(\"opentrons_96_well_aluminum_block\", \"2\", namespace="),
+        "{}",
+        ended.out
     );
     let ended = matterixc_in(&dir, &["emit", "bench.mtx", "--target", "opentrons-json"]);
     let document: Value = serde_json::from_str(&ended.out).expect("JSON");

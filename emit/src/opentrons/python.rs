@@ -139,15 +139,18 @@ impl Script {
                 let on = below.unwrap_or("protocol");
                 let slot = slot(&location).map(|s| format!(", {s}")).unwrap_or_default();
                 let label = quoted(text("displayName"));
+                // An adapter takes no label.
+                let (kind, label) = match protocol.adapters.contains(&uri) {
+                    true => ("adapter", String::new()),
+                    false => ("labware", format!(", label={label}")),
+                };
                 if protocol.definitions.iter().any(|(known, _)| *known == uri) {
                     let uri = quoted(&uri);
-                    self.line(&format!(
-                        "{id} = {on}.load_labware_from_definition(DEFINITIONS[{uri}]{slot}, label={label})"
-                    ));
+                    self.line(&format!("{id} = {on}.load_{kind}_from_definition(DEFINITIONS[{uri}]{slot}{label})"));
                 } else {
                     let (name, space) = (quoted(text("loadName")), quoted(text("namespace")));
                     self.line(&format!(
-                        "{id} = {on}.load_labware({name}{slot}, label={label}, namespace={space}, version={version})"
+                        "{id} = {on}.load_{kind}({name}{slot}{label}, namespace={space}, version={version})"
                     ));
                 }
             }

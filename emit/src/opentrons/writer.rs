@@ -207,14 +207,18 @@ impl Writer<'_, '_> {
         params.insert("namespace".to_owned(), (*space).into());
         params.insert("version".to_owned(), version.into());
         params.insert("displayName".to_owned(), instance.name.as_str().into());
+        let texts = self.protocol.subject.wiring.files.values().filter(|text| text.contains(name));
+        let found = texts.filter_map(|t| serde_json::from_str::<Value>(t).ok()).find(|d| {
+            let text = |v: &Value| v.as_str().map(str::to_owned);
+            text(&d["namespace"]).as_deref() == Some(space)
+                && text(&d["parameters"]["loadName"]).as_deref() == Some(name)
+                && d["version"].as_u64() == Some(version)
+        });
+        let roles = found.as_ref().and_then(|d| d["allowedRoles"].as_array());
+        if roles.is_some_and(|roles| roles.iter().any(|role| role == "adapter")) {
+            self.protocol.adapters.insert(uri.to_owned());
+        }
         if *space != OWN && !self.protocol.definitions.iter().any(|(known, _)| known == uri) {
-            let texts = self.protocol.subject.wiring.files.values();
-            let found = texts.filter_map(|t| serde_json::from_str::<Value>(t).ok()).find(|d| {
-                let text = |v: &Value| v.as_str().map(str::to_owned);
-                text(&d["namespace"]).as_deref() == Some(space)
-                    && text(&d["parameters"]["loadName"]).as_deref() == Some(name)
-                    && d["version"].as_u64() == Some(version)
-            });
             let Some(found) = found else {
                 let headline = format!("the definition `{uri}` of `{}` is not there", instance.name);
                 let help = "make the asset `from labware \"FILE.json\"`";

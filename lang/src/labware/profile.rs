@@ -44,7 +44,7 @@ impl Section {
                     let angle = whole * f64::from(k) / f64::from(ROUND);
                     [radius * sin(angle), low + radius * (1.0 - cos(angle))]
                 };
-                (0..=ROUND).map(point).collect()
+                up_to_end((0..=ROUND).map(point).collect(), high)
             }
             Section::Pyramids(count, [low, high]) => {
                 let point = |k: u32| {
@@ -54,10 +54,18 @@ impl Section {
                 };
                 // Straight walls are straight in a round one, too.
                 let steps = if low[..2] == high[..2] { ROUND as usize } else { 1 };
-                (0..=ROUND).step_by(steps).map(point).collect()
+                up_to_end((0..=ROUND).step_by(steps).map(point).collect(), high[2])
             }
         }
     }
+}
+
+/// Points that end at a height to the last bit, as the next section begins there.
+fn up_to_end(mut points: Vec<[f64; 2]>, height: f64) -> Vec<[f64; 2]> {
+    if let Some(last) = points.last_mut() {
+        last[1] = height;
+    }
+    points
 }
 
 impl Profile {
@@ -125,12 +133,13 @@ mod tests {
         let cone = Section::Cone([[1.0, 1.0], [2.0, 4.0]]);
         let half = Section::Cap(1.0, [0.0, 1.0]);
         let exact = PI * (2.0 / 3.0 + 7.0);
-        let inside = Profile::of(vec![cone, half], 4.0, 29.0).expect("an inside");
+        let inside = Profile::of(vec![cone, half], 4.0, 24.2).expect("an inside");
         assert!((inside.volume() / exact - 1.0).abs() < 1e-3, "{}", inside.volume());
         assert_eq!(inside.points().first(), Some(&[0.0, 0.0]));
+        assert!(inside.points().windows(2).all(|two| two[0][1] <= two[1][1]), "{inside:?}");
         assert_eq!(inside.points().last(), Some(&[2.0, 4.0]));
         // Too small for what it is to hold, a gap, no bottom.
-        assert_eq!(Profile::of(vec![cone, half], 4.0, 26.0 * 1.02 * 1.3), None);
+        assert_eq!(Profile::of(vec![cone, half], 4.0, exact * 1.02), None);
         assert_eq!(Profile::of(vec![Section::Cone([[1.0, 1.5], [2.0, 4.0]]), half], 4.0, 1.0), None);
         assert_eq!(Profile::of(vec![cone], 4.0, 1.0), None);
     }
