@@ -283,7 +283,7 @@ fn a_handler_for_what_a_motion_fails_with_is_no_dead_one() {
         assert!(code == 0 && !said.contains("dead-branch"), "{name}: {said}");
     }
     let (_, said) = handled("wait 1 s", "spilled");
-    assert!(said.contains("nothing before it fails with `spilled`"), "{said}");
+    assert!(said.contains("no step before this handler can fail with `spilled`"), "{said}");
     // The handler takes it in a run, and what it does is looked at.
     let steps = "pick source by panda\n    sequence { lean source at target by panda } on spilled { note \"ran over\" }\n    \
                  level source at target by panda\n    put back source by panda";

@@ -108,7 +108,7 @@ fn one_instance_in_two_branches_is_found_where_they_meet() {
 
 #[test]
 fn claims_in_a_circle_are_found_unless_something_in_common_is_held() {
-    let circle = "error deadlock: claims of `panda` and `plate` can wait for each other for ever";
+    let circle = "error deadlock: claims of `panda` and `plate` can wait for each other forever";
     let crossed = "parallel {\nclaim plate { wait 1 s; claim panda { wait 1 s } }\nclaim panda { wait 1 s; claim plate { wait 1 s } }\n}";
     only("crossed", crossed, circle);
     let ordered = crossed.replace("claim panda { wait 1 s; claim plate {", "claim plate { wait 1 s; claim panda {");

@@ -407,7 +407,7 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let (from, to) = (self.spoken_name(from), self.spoken_name(to));
-        let headline = format!("`{member}` goes with what `{from}` holds, and `{to}` has no place for it");
+        let headline = format!("`{to}` has no `{member}`: the `{member}` of the contents of `{from}` would be lost");
         let d = Diagnostic::warning(codes::BALANCE_BREACH, at, headline, "would be lost");
         self.report(d.help(format!("give `{to}` contents that have `{member}` as well")));
     }

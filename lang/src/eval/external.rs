@@ -201,8 +201,13 @@ impl Elaborator<'_> {
         let Some((_, bound)) = TABLE.iter().find(|(n, _)| *n == name) else {
             let declared = params.first().copied().unwrap_or(at);
             self.report(
-                Diagnostic::error(codes::UNBOUND_EXTERN, at, format!("nothing provides `{name}`"), "called here")
-                    .because(declared, "declared `extern` here"),
+                Diagnostic::error(
+                    codes::UNBOUND_EXTERN,
+                    at,
+                    format!("the compiler has no function `{name}`"),
+                    "called here",
+                )
+                .because(declared, "declared `extern` here"),
             );
             return Value::Error;
         };

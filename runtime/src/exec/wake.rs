@@ -144,7 +144,7 @@ impl Executor<'_, '_> {
             return Ok(Fired::new());
         }
         let mut fault = self.run_fault(codes::DEADLOCK, self.standstill());
-        fault.help.push("claim everything that is needed together in one `claim`, or in the same order".to_owned());
+        fault.help.push("claim all of them in one `claim`, or in the same order everywhere".to_owned());
         Err(fault)
     }
 
