@@ -28,7 +28,7 @@ fn every_code_is_listed_under_its_family() {
 fn an_unknown_code_is_a_usage_error_with_a_suggestion() {
     let ended = matterixc(&["explain", "syntx"]);
     assert_eq!((ended.code, ended.out.as_str()), (2, ""));
-    assert_eq!(ended.err, "error: there is no diagnostic code `syntx`\nhelp: did you mean `syntax`?\n");
+    assert_eq!(ended.err, "error: unknown diagnostic code `syntx`\nhelp: did you mean `syntax`?\n");
     let ended = matterixc(&["explain", "zzzzzzzzzzzzzzzz"]);
     assert_eq!(ended.code, 2);
     assert!(ended.err.contains("help: `matterixc explain` lists all codes; "), "{}", ended.err);

@@ -192,7 +192,7 @@ fn a_gas_stands_in_its_own_equilibrium_alone() {
     let read = lab("use std::gases", "", "100 g of water", "    expect cup.contents.amount[CO2(g)] < 1 mol\n");
     assert!(said(read).contains("no vessel holds `CO2(g)`"));
     let plain = lab("use std::gases", "", "100 g of water", "    expect gas_pressure(cup.contents, CO2) < 1 bar\n");
-    assert!(said(plain).contains("no equilibrium of the file has `CO2` as a gas"));
+    assert!(said(plain).contains("no equilibrium of this file contains `CO2` as a gas"));
     let pressures = OPEN.replace(" exchange_rate", " gases: [CO2(g)], pressures: [1 bar, 2 bar], exchange_rate");
     assert!(said(lab("use std::gases", &pressures, "100 g of water", "")).contains("1 gases above it and 2 pressures"));
 }

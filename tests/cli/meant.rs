@@ -152,10 +152,10 @@ fn a_label_names_what_is_weighed_in_or_an_ion_of_it() {
     assert_eq!(matterixc_in(&dir, &["check", "bench.mtx"]).out, "no findings\n");
 
     let (headline, help, _) = finding("none", &text.replace("K+", "ethanol"));
-    assert_eq!(headline, "the label of `iodide` is of `ethanol`, of which its recipe holds none");
+    assert_eq!(headline, "the label of `iodide` gives `ethanol`, but the recipe contains none");
     assert_eq!(help, ["label a species of the recipe, or add `ethanol` to it"]);
     let (headline, ..) = finding("zero", &text.replace("0.04 mol/kg of K+", "0 mol/kg of KI"));
-    assert_eq!(headline, "the label of `iodide` is zero: its recipe gives 0.0394977 mol/kg of KI");
+    assert_eq!(headline, "the label of `iodide` is zero: by its recipe it contains 0.0394977 mol/kg of KI");
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn a_catalyst_of_the_order_alone_is_one_mistake() {
     let text = BENCH.replace("100 g of water", "100 mL of water + 0.1 mmol of H2O2 + 1 mmol of KI");
     let (found, help, _) = finding("catalyst", &text.replace("lab", reaction));
     assert_eq!(found, "`I-` is not in the equation of `decay`");
-    assert_eq!(help, ["a catalyst stands on both sides: `A + C -> B + C`"]);
+    assert_eq!(help, ["write a catalyst on both sides: `A + C -> B + C`"]);
 }
 
 #[test]

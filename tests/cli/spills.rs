@@ -260,7 +260,7 @@ fn a_capacity_beyond_the_inside_and_an_inside_beyond_the_outside_are_found_where
     let outside = "[(0, 0) mm, (35, 0) mm, (35, 95) mm]";
     for (inside, words) in [
         ("[(0, 2) mm, (36, 2) mm, (36, 95) mm]", "it is 36 mm wide from the middle, the outside 35 mm"),
-        ("[(0, 2) mm, (33, 2) mm, (33, 96) mm]", "it has a point at a height of 96 mm, where the outside has none"),
+        ("[(0, 2) mm, (33, 2) mm, (33, 96) mm]", "it has a point at a height of 96 mm, above or below the outside"),
     ] {
         let (code, said) = declared(&format!("shape: turned({outside}, {inside})"));
         assert!(code == 1 && said.contains("sticks out of its outside") && said.contains(words), "{said}");

@@ -106,7 +106,7 @@ fn an_unknown_name_suggests_near_ones() {
     assert_eq!((ended.code, ended.out.as_str()), (1, ""));
     assert_eq!(
         ended.err,
-        "error: there is no substance `dioxan`\nhelp: did you mean `dioxane`, `dioxolane` or `trioxane`?\n"
+        "error: unknown substance `dioxan`\nhelp: did you mean `dioxane`, `dioxolane` or `trioxane`?\n"
     );
     let ended = matterixc(&["substance", "qqqqqqqqqqqqqqqqqq"]);
     assert_eq!(ended.code, 1);

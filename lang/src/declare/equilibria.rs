@@ -119,7 +119,7 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
                 codes::MISSING_FIELD,
                 span,
                 format!("`{name}` has no constant"),
-                "where it lies is unknown",
+                "the position of this equilibrium is unknown",
             )
             .help(
                 "add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10`, `pksp: 9.75`, or `potential: 0.77 V` for a half-cell",
@@ -136,8 +136,8 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
         ),
         (Some(first), None) if first.key.text != ANALYTIC && field(fields, HEAT).is_some() => {
             let Some(heat) = field(fields, HEAT) else { return };
-            let headline = format!("the heat of `{name}` is its `enthalpy`");
-            let d = Diagnostic::error(codes::UNKNOWN_FIELD, heat.key.span, headline, "stands beside `analytic` alone");
+            let headline = format!("use `enthalpy` for the heat of `{name}`");
+            let d = Diagnostic::error(codes::UNKNOWN_FIELD, heat.key.span, headline, "only allowed with `analytic`");
             diagnostics.push(d.because(first.key.span, "its constant").help("write `enthalpy`"));
         }
         (Some(first), None) if first.key.text == ANALYTIC => {
@@ -168,27 +168,27 @@ fn check_form(
     if let Some(f) = field(fields, "pka") {
         let gives = right.iter().any(|(s, n)| is_proton(s) && *n == 1.0) && dry(left) == 1;
         if !gives {
-            let headline = "a pKa is that of an acid: `HA <-> H+ + A-`";
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "does not give off one H+");
-            let d = d.because(f.key.span, "the pKa stands here");
+            let headline = "`pka` needs the equation of an acid: `HA <-> H+ + A-`";
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "does not release one H+");
+            let d = d.because(f.key.span, "the pKa is here");
             diagnostics.push(d.help("write the equation of the acid, or give `log_constant` for this one"));
         }
     }
     if let Some(f) = field(fields, POTENTIAL) {
         let electrons = |side: &[(SpeciesId, f64)]| side.iter().any(|(s, _)| species.get(*s).is_electron);
         if !electrons(left) || electrons(right) {
-            let headline = "a potential is that of a half-cell which takes up electrons: `Fe3+ + e- <-> Fe2+`";
+            let headline = "`potential` needs a half-cell written as a reduction: `Fe3+ + e- <-> Fe2+`";
             let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "no electrons on its left side");
-            let d = d.because(f.key.span, "the potential stands here");
+            let d = d.because(f.key.span, "the potential is here");
             diagnostics.push(d.help("write it as a reduction, with `e-` on the left"));
         }
     }
     let is_one_solid =
         dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || (*n == 1.0 && !species.get(*s).is_gas));
     if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")).filter(|_| !is_one_solid) {
-        let headline = "a solubility product is that of one solid: `AgCl <-> Ag+ + Cl-`";
+        let headline = "a solubility product needs the equation of one solid: `AgCl <-> Ag+ + Cl-`";
         let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
-        diagnostics.push(d.because(f.key.span, "the solubility product stands here"));
+        diagnostics.push(d.because(f.key.span, "the solubility product is here"));
     }
 }
 
@@ -205,12 +205,14 @@ fn gas_form(
     let name = &species.get(gas).name;
     let wrong = |headline: String, label: &str| {
         let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, label);
-        Box::new(d.help("write what the gas dissolves as, and what becomes of that by itself: `CO2(g) <-> CO2`"))
+        Box::new(
+            d.help("write the gas and its dissolved form only, and later reactions on their own: `CO2(g) <-> CO2`"),
+        )
     };
     let dry = |side: &'_ [(SpeciesId, f64)]| -> Vec<(SpeciesId, f64)> {
         side.iter().copied().filter(|(s, _)| !species.get(*s).is_water).collect()
     };
-    let headline = format!("the equilibrium of `{name}` says how much of it dissolves");
+    let headline = format!("the equilibrium of the gas `{name}` must give its solubility");
     let [(dissolved, one)] = dry(right)[..] else {
         return Err(wrong(headline, "its right side is not one dissolved species"));
     };
@@ -218,12 +220,12 @@ fn gas_form(
         return Err(wrong(headline, "its left side is not one gas"));
     }
     if one != 1.0 || dry(left)[0].1 != 1.0 {
-        return Err(wrong(headline, "of the gas and of what it dissolves as there is one each"));
+        return Err(wrong(headline, "both coefficients must be 1"));
     }
     let def = species.get(dissolved);
     let is_charged = def.formula.as_ref().is_some_and(|f| f.charge != 0);
     if def.is_gas || def.is_electron || is_charged || !def.dissolves.is_empty() || def.name.ends_with("(s)") {
-        return Err(wrong(headline, &format!("`{}` is not a neutral species that is dissolved", def.name)));
+        return Err(wrong(headline, &format!("`{}` is not a neutral dissolved species", def.name)));
     }
     match before.iter().find(|e| e.gas.is_some_and(|(other, _)| other == gas)) {
         Some(first) => {

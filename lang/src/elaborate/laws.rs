@@ -303,7 +303,7 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::INVALID_LAW,
                         span,
-                        "a process changes flows and derivatives only",
+                        "a process can change only flows and derivatives",
                         "not a flow",
                     )
                     .help("write `x' += rate` for a state; only an event assigns `x = value`"),
@@ -312,8 +312,13 @@ impl<'a> Elaborator<'a> {
             };
             if op == AssignOp::Set {
                 self.report(
-                    Diagnostic::error(codes::INVALID_LAW, span, "a flow is a sum of contributions", "assigned here")
-                        .help("use `+=` or `-=`, so that other processes can contribute too"),
+                    Diagnostic::error(
+                        codes::INVALID_LAW,
+                        span,
+                        "a flow is a sum of contributions: it cannot be assigned",
+                        "assigned here",
+                    )
+                    .help("use `+=` or `-=`, so that other processes can contribute"),
                 );
                 return;
             }
@@ -424,7 +429,7 @@ impl<'a> Elaborator<'a> {
                         codes::WRONG_ARGUMENTS,
                         call.span,
                         "`rinse` needs one vessel",
-                        "rinse what?",
+                        "which vessel?",
                     )
                     .help("write `rinse(vessel)`"),
                 );
@@ -501,7 +506,7 @@ impl<'a> Elaborator<'a> {
                 codes::WRONG_ARGUMENTS,
                 at,
                 "`soil` needs a thing and `from` another",
-                "soil what?",
+                "which things?",
             )
             .help("write `soil(thing, from: other)`"),
         );
@@ -533,7 +538,7 @@ impl<'a> Elaborator<'a> {
                 Diagnostic::error(
                     codes::INVALID_LAW,
                     callee.span,
-                    "only `move(...)` may stand here by itself",
+                    "only `move(...)` may be a line of its own here",
                     "has no effect",
                 )
                 .help("write `move(quantity, from: a, to: b)`"),
@@ -592,7 +597,7 @@ impl<'a> Elaborator<'a> {
         self.report(Diagnostic::error(
             codes::UNIT_MISMATCH,
             at,
-            format!("contents are moved by mass, volume or fraction, not by {found}"),
+            format!("give the moved contents as mass, volume or fraction, not as {found}"),
             format!("this is {found}"),
         ));
         None
@@ -606,7 +611,7 @@ impl<'a> Elaborator<'a> {
                 codes::TYPE_MISMATCH,
                 span,
                 format!("`{name}` has no contents"),
-                "nothing to move",
+                "it is not a vessel",
             ));
         }
         mixture
@@ -650,7 +655,7 @@ impl<'a> Elaborator<'a> {
             if !self.prototype && !self.writes(target, new, scope) {
                 self.report(
                     Diagnostic::error(codes::INVALID_LAW, target.span, "only a state can be assigned", "not a state")
-                        .help("parameters are fixed, derived quantities follow from states"),
+                        .help("parameters are fixed, and derived quantities follow from states"),
                 );
             }
             return None;
@@ -731,7 +736,7 @@ impl<'a> Elaborator<'a> {
                         codes::FLOW_UNBALANCED,
                         p.name.span,
                         format!(
-                            "`{}` does not conserve `{flow}`: what one body loses the other does not gain",
+                            "`{}` does not conserve `{flow}`: one body does not gain the amount that the other loses",
                             p.name.text
                         ),
                         "the two contributions do not cancel",

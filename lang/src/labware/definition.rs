@@ -103,7 +103,7 @@ impl Definition {
         let value: serde_json::Value = serde_json::from_str(text).map_err(|e| format!("it is not JSON ({e})"))?;
         match value.get("schemaVersion").and_then(serde_json::Value::as_u64) {
             Some(2 | 3) => {}
-            Some(other) => return Err(format!("its schema is {other}, known are 2 and 3")),
+            Some(other) => return Err(format!("its schema is {other}, but only 2 and 3 are supported")),
             None => return Err("it has no `schemaVersion`".into()),
         }
         let definition: Definition = serde_json::from_value(value).map_err(|e| e.to_string())?;
@@ -114,21 +114,21 @@ impl Definition {
     fn check(&self) -> Result<(), String> {
         let [x, y, z] = self.size().ok_or("it has no outer dimensions")?;
         if !(x > 0.0 && y > 0.0 && z > 0.0) {
-            return Err("its outer dimensions are not above 0".into());
+            return Err("its outer dimensions must be above 0".into());
         }
         if self.wells.is_empty() {
             return Err("it has no wells".into());
         }
         for (name, well) in &self.wells {
             if crate::eval::lab::grids::Place::parse(name).is_none() {
-                return Err(format!("`{name}` is not a place such as `A1`"));
+                return Err(format!("`{name}` is not the name of a well such as `A1`"));
             }
             let open = match well.opening {
                 Opening::Circular { diameter } => diameter > 0.0,
                 Opening::Rectangular { x_dimension, y_dimension } => x_dimension > 0.0 && y_dimension > 0.0,
             };
             if !(open && well.depth >= 0.0 && well.total_liquid_volume > 0.0) {
-                return Err(format!("the size of `{name}` is not above 0"));
+                return Err(format!("the size of `{name}` must be above 0"));
             }
         }
         Ok(())

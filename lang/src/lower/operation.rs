@@ -118,8 +118,8 @@ impl<'a> Planner<'a, '_> {
                 self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     clause.span,
-                    "one step of a robot is one motion",
-                    "a second motion",
+                    "one step of a robot can have only one motion",
+                    "the second motion",
                 ));
                 return None;
             }
@@ -317,8 +317,8 @@ impl<'a> Planner<'a, '_> {
                 ClauseKind::Presumes { .. } => self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     clause.span,
-                    "only what is done by itself presumes something",
-                    "`presumes` belongs to a command or an `extern skill`",
+                    "a skill with a body cannot have `presumes`",
+                    "`presumes` is for a command or an `extern skill`",
                 )),
                 ClauseKind::While(e) => invariants.extend(self.condition(e, inner)),
                 ClauseKind::Effect(effects) => {
@@ -330,8 +330,8 @@ impl<'a> Planner<'a, '_> {
                 ClauseKind::Until(e) => self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     e.span,
-                    "a skill with a body lasts as long as its steps",
-                    "`until` belongs to a command",
+                    "a skill with a body cannot have `until`: it lasts as long as its steps",
+                    "`until` is for a command",
                 )),
                 ClauseKind::Moves { .. }
                 | ClauseKind::Grips { .. }
@@ -340,8 +340,8 @@ impl<'a> Planner<'a, '_> {
                     self.lab.report(Diagnostic::error(
                         codes::MISPLACED,
                         clause.span,
-                        "a skill with a body moves as its steps do",
-                        "belongs to an `extern skill` or a command",
+                        "a skill with a body cannot have a motion: its steps move",
+                        "for an `extern skill` or a command",
                     ));
                 }
                 ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => {}
@@ -355,11 +355,12 @@ impl<'a> Planner<'a, '_> {
         let (target, value) = match effect {
             Effect::Assign(target, value) => (target, value),
             Effect::Call(e) => {
-                self.lab.report(crate::declare::types::unsupported(e.span, "promised transfers"));
+                self.lab
+                    .report(crate::declare::types::unsupported(e.span, "transfers as effects of a skill with a body"));
                 return None;
             }
             Effect::Each { set, .. } => {
-                self.lab.report(crate::declare::types::unsupported(set.span, "promises of each of a set"));
+                self.lab.report(crate::declare::types::unsupported(set.span, "effects for each of a set"));
                 return None;
             }
         };

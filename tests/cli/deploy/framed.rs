@@ -204,9 +204,9 @@ fn a_number_without_room_is_found_before_anything_is_sent() {
 fn what_cannot_be_framed_or_read_back_is_found() {
     let framings = [
         ("carries: text", "what a frame looks like is not said"),
-        ("frame: \"{data}\\r\"", "what the frames carry is not said"),
+        ("frame: \"{data}\\r\"", "a framing needs `carries`"),
         ("carries: words, frame: \"{data}\\r\"", "`text`, `bytes` or `modbus`"),
-        ("carries: text, frame: \"{data}\"", "nothing says where a message ends"),
+        ("carries: text, frame: \"{data}\"", "the end of a message is undefined"),
         ("carries: text, frame: \"<>\"", "no room for its message"),
         ("carries: text, frame: \"{data}{data}\\r\"", "stands twice"),
         ("carries: text, frame: \"{dta}\\r\"", "has no part `dta`"),

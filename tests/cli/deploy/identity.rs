@@ -134,9 +134,9 @@ fn what_asks_for_an_identity_keeps_a_word_of_the_answer() {
     assert_eq!(ended.code, 1, "{}", ended.err);
     assert!(ended.err.contains("`ValveLine` cannot ask `valve` who it is"), "{}", ended.err);
     for (line, said) in [
-        ("identity sends \"ID\" expects \"ID {_}\"", "no word of the answer says who the device is"),
-        ("identity sends \"ID\"", "no word of the answer says who the device is"),
-        ("identity sends \"A\", \"B\" expects \"{<serial>}\"", "one question asks a device who it is"),
+        ("identity sends \"ID\" expects \"ID {_}\"", "`identity` must keep a word of the reply"),
+        ("identity sends \"ID\"", "`identity` must keep a word of the reply"),
+        ("identity sends \"A\", \"B\" expects \"{<serial>}\"", "`identity` needs exactly one message"),
     ] {
         write(&dir, "lab.mtx", PLAIN.replace("LINE", line));
         let ended = matterixc_in(&dir, &["check", "lab.mtx"]);

@@ -293,7 +293,7 @@ fn what_no_server_understands_is_found_before_anything_is_sent() {
         ("open sends \"FETCH /state\"", "is no method"),
         ("open sends \"GET state\"", "is no path"),
         ("open sends \"POST /state on=1\"", "is no member of a body"),
-        ("open sends \"GET /jobs/<job>\"", "nothing says what `<job>` is"),
+        ("open sends \"GET /jobs/<job>\"", "`<job>` is never set"),
         ("open sends \"GET /state\" expects \"fine\"", "is neither a status"),
         ("stop heating sends \"POST /off\" until asks \"GET /state\" timeout 1 s", "nothing but an answer says"),
     ];
