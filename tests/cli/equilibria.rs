@@ -143,7 +143,7 @@ fn a_database_becomes_a_module_that_runs() {
     write(&dir, "small.dat", DATABASE);
     let imported = matterixc_in(&dir, &["import", "phreeqc", "small.dat", "--phases", "Gibbsite", "-o", "small.mtx"]);
     assert_eq!(imported.code, 0, "{}", imported.err);
-    assert!(imported.err.contains("its reaction has electrons: Fe+3 (line 14)"), "{}", imported.err);
+    assert!(imported.err.contains("its reaction contains electrons: Fe+3 (line 14)"), "{}", imported.err);
     assert_eq!(matterixc_in(&dir, &["fmt", "--check", "small.mtx"]).code, 0);
     let expect = "    expect cup.contents.amount[Gibbsite(s)] in 0.9 mmol .. 1 mmol
     expect acidity(cup.contents) in 6 .. 8\n";

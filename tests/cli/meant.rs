@@ -94,17 +94,17 @@ fn what_follows_from_one_mistake_is_not_said() {
     let heated = BENCH
         .replace("wait 5 s", "heat plate to 60 degC\n    wait 5 min\n    expect beaker.contents.temperature > 30 degC");
     for (slip, from, to, headline) in [
-        ("call", "wait 5 min", "time.sleep(10)", "a step starts with a verb"),
+        ("call", "wait 5 min", "time.sleep(10)", "a step must start with a verb"),
         ("bracket", "(0, 0, 0) m", "(0, 0, 0 m holding 60 g of water", "`(` is not closed"),
-        ("range", "> 30 degC", "in 20 . 30 degC", "a range is written with `..`"),
+        ("range", "> 30 degC", "in 20 . 30 degC", "write a range with `..`"),
         ("nameless", "    table", "    Beaker250mL at (1, 1, 0) m\n    table", "this `Beaker250mL` has no name"),
         (
             "step",
             "    table",
             "    transfer 100 uL from a to b\n    table",
-            "a step stands in a workflow, not in a lab",
+            "a step belongs in a workflow, not in a lab",
         ),
-        ("brace", "wait 5 min", "note \"now x :.1}\"", "`}` in a text stands for a value"),
+        ("brace", "wait 5 min", "note \"now x :.1}\"", "`}` in a text starts or ends a value"),
         (
             "result",
             "wait 5 min",

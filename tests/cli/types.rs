@@ -121,7 +121,7 @@ fn a_value_in_a_text_is_checked_where_it_stands() {
         ("empty", "{mode}", "{}", "syntax: expected a value, found `}`"),
         ("two", "{mode}", "{mode v}", "syntax: expected `as`, found `v`"),
         ("open", "{mode}", "{mode", "syntax: expected `(` or `as`, found `,`"),
-        ("close", "{mode}", "mode}", "syntax: `}` in a text stands for a value"),
+        ("close", "{mode}", "mode}", "syntax: `}` in a text starts or ends a value"),
         (
             "digits",
             "{mode}",

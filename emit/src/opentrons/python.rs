@@ -36,8 +36,8 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
 }
 
 fn no_call(command: &Command) -> Diagnostic {
-    not_expressible(command.at, format!("{WHAT} in Python has no call for `{}`", command.name), "is told this")
-        .help("write it as `--target opentrons-json`")
+    not_expressible(command.at, format!("{WHAT} in Python has no call for `{}`", command.name), "this step sends it")
+        .help("use `--target opentrons-json`")
 }
 
 struct Script {

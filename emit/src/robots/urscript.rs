@@ -1,4 +1,4 @@
-//! The motions of one arm of Universal Robots as a program in URScript.
+//! The motions of one arm of Universal Robots as a URScript program.
 //!
 //! Joint positions are followed with `servoj` at the times of the performance, after a `movej` to where the arm stood when it
 //! began. What the arm does not do itself, such as closing its gripper or heating a plate, is a function that asks a person;
@@ -21,7 +21,7 @@ use crate::{Subject, Written, place};
 pub const WIRE: &str = "urscript";
 
 /// What the target is called in findings.
-const WHAT: &str = "a program in URScript";
+const WHAT: &str = "a URScript program";
 
 /// How far ahead `servoj` smooths, s, and how stiffly it follows: the defaults of the URScript manual.
 const LOOK_AHEAD: f64 = 0.1;
@@ -60,7 +60,7 @@ pub fn script(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     for travel in travels.iter().filter(|t| t.owner == t.robot) {
         if others.insert(travel.robot) {
             let headline =
-                format!("{WHAT} is for one arm, and this moves `{}` and `{}`", name(arm), name(travel.robot));
+                format!("{WHAT} is for one arm, but this workflow moves `{}` and `{}`", name(arm), name(travel.robot));
             found.push(not_expressible(at(travel), headline, format!("moves `{}`", name(travel.robot))));
         }
     }

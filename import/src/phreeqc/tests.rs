@@ -64,10 +64,10 @@ fn a_module_has_what_the_database_says() {
     assert_eq!(
         left,
         [
-            ("Fe+3", "its reaction has electrons"),
-            ("Gypsum", "it was not asked for among the phases"),
+            ("Fe+3", "its reaction contains electrons"),
+            ("Gypsum", "it is not among the requested phases"),
             ("CO2(g)", "it is a gas"),
-            ("EXCHANGE_SPECIES", "this kind of block is not imported")
+            ("EXCHANGE_SPECIES", "blocks of this kind are not imported")
         ]
     );
 }

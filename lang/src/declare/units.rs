@@ -319,6 +319,6 @@ pub fn unit_error(unit: &UnitText, error: UnitError) -> Diagnostic {
             format!("`{}` is not a unit", unit.text),
             "cannot be read as a product of units",
         )
-        .help("a unit is one word without blanks: `kg/(mol*s)`, `W/(m^2*K)`, `1/s`"),
+        .help("write a unit as one word without blanks: `kg/(mol*s)`, `W/(m^2*K)`, `1/s`"),
     }
 }

@@ -372,7 +372,7 @@ impl<'a> Elaborator<'a> {
         let near = if is_unit { Vec::new() } else { near::nearest(&n.text, candidates) };
         let mut d = near::unknown(n, format!("unknown name `{}`", n.text), "not declared");
         if is_unit {
-            d = d.help(format!("`{}` is a unit: a unit is one word without blanks, such as `W/K`", n.text));
+            d = d.help(format!("`{}` is a unit: write a unit as one word without blanks, such as `W/K`", n.text));
         }
         if let Some(import) = names.import_of(scope.module, &n.text, is_value).filter(|_| !is_unit) {
             self.report(import.offered(d));
