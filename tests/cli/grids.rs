@@ -209,7 +209,7 @@ workflow w in l {
         ("other", r#"{ "ordering": [] }"#, "it has no `schemaVersion`"),
         ("bare", r#"{ "schemaVersion": 2 }"#, "missing field"),
         ("empty", &RACK.replace("1500", "0"), "the size of `A1` must be above 0"),
-        ("label", &RACK.replace("\"A1\"", "\"1A\""), "`1A` is not a place such as `A1`"),
+        ("label", &RACK.replace("\"A1\"", "\"1A\""), "`1A` is not the name of a well such as `A1`"),
         ("shape", &RACK.replace("circular", "round"), "unknown variant `round`"),
     ] {
         write(&dir, "plates/rack.json", json);

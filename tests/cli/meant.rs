@@ -172,7 +172,7 @@ fn a_catalyst_of_the_order_alone_is_one_mistake() {
     let reaction = "reaction decay: 2 H2O2 -> 2 H2O + O2 { rate: 1.2e-3 L/(mol*s), order: { H2O2: 1, I-: 1 } }\n\nlab";
     let text = BENCH.replace("100 g of water", "100 mL of water + 0.1 mmol of H2O2 + 1 mmol of KI");
     let (found, help, _) = finding("catalyst", &text.replace("lab", reaction));
-    assert_eq!(found, "`I-` is not in the equation of `decay`");
+    assert_eq!(found, "the equation of `decay` does not contain `I-`");
     assert_eq!(help, ["write a catalyst on both sides: `A + C -> B + C`"]);
 }
 

@@ -94,7 +94,7 @@ fn a_law_whose_rate_follows_what_is_left_takes_nothing_of_nothing() {
 fn a_law_that_takes_from_an_empty_vessel_ends_the_run() {
     let (code, text) = run_case("numerics/runs_dry.mtx", "w", &[]);
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("error[transfer-fraction]: `flow(f)` takes more than there is"), "{text}");
+    assert!(text.contains("error[transfer-fraction]: `flow(f)` removes more than `"), "{text}");
     assert!(text.contains("at 11.97"), "{text}");
 }
 

@@ -118,7 +118,11 @@ fn what_has_no_schedule_and_what_is_none_is_said() {
     let path = write(&dir, "none.mtx", text);
     let ended = matterixc(&["plan", &path]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("error[unschedulable]: no schedule of `jobs` keeps all its windows"), "{}", ended.err);
+    assert!(
+        ended.err.contains("error[unschedulable]: no schedule of `jobs` keeps all of its time windows"),
+        "{}",
+        ended.err
+    );
     let other = write(&dir, "other.mtx", shop(&[&[(0, 1)], &[(0, 2)]]));
     let schedule = write(&dir, "other.json", matterixc(&["plan", &other, "--format", "json"]).out);
     let path = write(&dir, "third.mtx", shop(&[&[(1, 1), (0, 2)]]).replace("workflow jobs", "workflow others"));

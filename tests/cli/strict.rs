@@ -37,7 +37,7 @@ fn each_slip_is_one_finding() {
         ("ring", "= 0.4 m", "= 0.5 stride", "circular: the unit `stride` is defined by itself"),
         ("bound", "conductance: 3", "conductance: -3", "out-of-range: `conductance` cannot be -3 W/K"),
         ("relation", "piped: true", "piped: 3", "type-mismatch: `piped` expects a truth value, found a plain number"),
-        ("order", "HI: 1 }", "NaCl: 1 }", "unknown-field: `NaCl` is not in the equation of `ferment`"),
+        ("order", "HI: 1 }", "NaCl: 1 }", "unknown-field: the equation of `ferment` does not contain `NaCl`"),
         ("requires", "{\n    rate", "{ // a note\n    rate", ""),
         ("member", "requires: temp", "requires: tmep", "unknown-name: unknown name `tmeperature`"),
         ("whole", "n: Int = 2) in", "n: Int = 2.5) in", "type-mismatch: `n` expects a whole number, found 2.5"),

@@ -88,7 +88,8 @@ fn one_instance_in_two_branches_is_found_where_they_meet() {
     let two = "start one = { heat plate to 60 degC; wait 1 min }\nstart two = { heat plate to 80 degC; wait 1 min }";
     only("jobs", two, twice);
     none("claims", &two.replace("{ ", "{ claim plate { ").replace(" min }", " min } }"));
-    let held = "error claimed-twice: `heat plate to 80 degC` uses `plate` while another branch or job has claimed it";
+    let held =
+        "error claimed-twice: `heat plate to 80 degC` uses `plate` while another branch or job holds a claim on it";
     only("one_claim", "parallel {\nclaim plate { heat plate to 60 degC }\nheat plate to 80 degC\n}", held);
     only("around", "claim plate { parallel { heat plate to 60 degC; heat plate to 80 degC } }", twice);
     none("apart", "parallel {\nsequence { wait 1 min; heat plate to 60 degC }\nheat plate to 80 degC\n}");

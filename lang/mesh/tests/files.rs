@@ -92,7 +92,7 @@ fn what_is_wrong_is_said() {
         ("a.obj", b"v 0 0\nf 1 2 3\n", "it is no OBJ"),
         ("a.obj", b"# nothing\n", "no triangles"),
         ("a.obj", flat, "flat"),
-        ("a.gltf", b"{}", "it is no glTF"),
+        ("a.gltf", b"{}", "it is not a glTF file"),
     ];
     for (name, bytes, expected) in cases {
         let said = read(name, bytes).expect_err(name);

@@ -68,7 +68,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
         "line 11: `axsi` is not an element of URDF; did you mean `axis`?",
     ),
     ("lower=\"-1\" upper=\"1\"", "", "line 12: `limit` of joint `turn` has no `lower` and `upper`"),
-    ("lower=\"-1\" upper=\"1\"", "lower=\"2\" upper=\"1\"", "leave no position: 2 to 1"),
+    ("lower=\"-1\" upper=\"1\"", "lower=\"2\" upper=\"1\"", "allow no position: 2 to 1"),
     ("lower=\"-1\"", "lower=\"-inf\"", "line 12: `-inf` in `lower` of `limit` is not a finite number"),
     (
         "velocity=\"2\" effort=\"3\"/>\n    <safety",

@@ -246,7 +246,7 @@ fn what_cannot_be_framed_or_read_back_is_found() {
         ("heat to(t) sends \"SP{t as degC :.1}0\"", "cannot be told from what follows"),
         ("heat to(t) sends \"S>{t as degC :.1}\"", "cannot stand in a message"),
         ("heat to(t) sends \"S\\x02{t as degC :.1}\"", "cannot stand in a message"),
-        ("heat to(t) sends \"SP{t as degC :.1}\", \"ON\" expects \"A\", \"B\", \"C\"", "3 replies are expected to 2"),
+        ("heat to(t) sends \"SP{t as degC :.1}\", \"ON\" expects \"A\", \"B\", \"C\"", "3 replies are expected for 2"),
         ("reading temperature asks \"T\" expects \"{degC}{_}\"", "two values must be known"),
         ("reading temperature asks \"T\" expects \"{degC :05.1\"", "not closed"),
         ("reading active asks \"T\" expects \"{}\"", "which word `active` is"),

@@ -44,7 +44,7 @@ fn a_no_in_a_finally_does_not_hold_up_what_switches_off() {
     // Nobody is there: each question is answered with no at once.
     let ended = deploy(&dir, &["--mode", "real"]);
     assert!(heard(&device, "STOP_1") > 0, "{:?}", device.heard());
-    assert!(ended.code == 1 && ended.err.contains("a question was answered with no"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("a person answered no"), "{}", ended.err);
     assert!(ended.err.contains("nobody was there to confirm"), "{}", ended.err);
 }
 
@@ -81,7 +81,7 @@ workflow warm in bench {
     write(&dir, "lab.toml", bound);
     let ended = deploy(&dir, &["--mode", "real", "--yes"]);
     let one_line = flat(&ended.err);
-    let named = "a `finally` broke off: `stop stirring other`, `ask \"is it cool?\"` not done";
+    let named = "a `finally` stopped early: `stop stirring other`, `ask \"is it cool?\"` did not run";
     assert!(ended.code == 1 && one_line.contains(named), "{one_line}");
     assert!(heard(&other, "STOP_4") > 0, "safe all the same: {:?}", other.heard());
 }

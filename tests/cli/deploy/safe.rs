@@ -226,7 +226,7 @@ fn a_watchdog_is_fed_before_it_trips() {
     let dir = bench("watched", OWN, "plate", "127.0.0.1:1");
     for (every, within, wrong) in [("6 s", "6 s", true), ("10 s", "6 s", true), ("5.9 s", "6 s", false)] {
         let found = check(&dir, &watched(every, within));
-        assert_eq!(found.contains("a watchdog that waits 6 s hears something only every"), wrong, "{every}: {found}");
+        assert_eq!(found.contains("the watchdog waits 6 s, but a message comes only every"), wrong, "{every}: {found}");
         assert_eq!(found.contains("error"), wrong, "{every}: {found}");
     }
     // Without a patience it is no watchdog, and says so.

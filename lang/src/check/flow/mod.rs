@@ -553,7 +553,7 @@ lab bench {
             followed("wait until c.count >= 5 timeout 1 min"),
             ["waits-for-ever: `c.count >= 5` never becomes true: nothing changes it"]
         );
-        assert_eq!(followed("add 1 by c\nexpect c.count == 4"), ["expectation-failed: `c.count == 4` does not hold"]);
+        assert_eq!(followed("add 1 by c\nexpect c.count == 4"), ["expectation-failed: `c.count == 4` is false"]);
     }
 
     #[test]
@@ -572,7 +572,7 @@ lab bench {
     fn branches_are_followed_beside_each_other() {
         assert_eq!(
             followed("parallel { sequence { add 3 by c } sequence { wait 1 s } }\nexpect c.count == 6"),
-            ["expectation-failed: `c.count == 6` does not hold"]
+            ["expectation-failed: `c.count == 6` is false"]
         );
     }
 }

@@ -288,7 +288,7 @@ impl Interpreter<'_, '_> {
     pub fn unexpected(&mut self, condition: &Condition, facts: &AbstractState) {
         let some = self.doubt > 0;
         let ways = if some { ", on some paths through the workflow" } else { "" };
-        let headline = format!("`{}` does not hold{ways}", condition.text);
+        let headline = format!("`{}` is false{ways}", condition.text);
         let measured = self.measured(condition, facts);
         let said = if measured.is_empty() { "expected here".to_string() } else { measured.join(", ") };
         let (code, headline) = match self.not_made(condition, facts) {

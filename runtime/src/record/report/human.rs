@@ -41,9 +41,9 @@ fn head(report: &Report) -> Option<String> {
     let status = match report.status {
         Status::Passed => "passed",
         Status::Missed if report.findings.iter().any(|f| f.severity == Severity::Error) => {
-            "something met or came about that must not"
+            "a hazard or an incompatible mixture occurred"
         }
-        Status::Missed if report.expectations.iter().all(|e| e.passed) => "something was left on or in hand",
+        Status::Missed if report.expectations.iter().all(|e| e.passed) => "something was left on, open or held",
         Status::Missed => "an expectation was not met",
         Status::Failed => "failed",
         Status::Cancelled => "cancelled",
