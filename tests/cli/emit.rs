@@ -273,7 +273,7 @@ lab deck {\n    lamp = Led on ot2.slot[9]",
     write(&dir, "a.mtx", text);
     let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-json"]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("error[wrong-message]: `blink` is no command of Opentrons"), "{}", ended.err);
+    assert!(ended.err.contains("error[wrong-message]: unknown Opentrons command `blink`"), "{}", ended.err);
 }
 
 #[test]

@@ -392,7 +392,7 @@ fn a_vessel_that_is_filled_over_its_rim_in_a_hand_is_found_when_it_runs_over() {
     matterixc_in(&dir, &["run", "left.mtx", "--fidelity", "motion", "--out", "left"]);
     let verdict = matterixc_in(&dir, &["verify", "left"]);
     // 280 mL are in it then, and told to a thousandth.
-    let told = ["38.2", "38.3", "38.4", "38.5"].map(|ml| format!("{ml} mL run over the rim of `source`"));
+    let told = ["38.2", "38.3", "38.4", "38.5"].map(|ml| format!("{ml} mL spill over the rim of `source`"));
     assert!(verdict.code == 1 && told.iter().any(|told| verdict.out.contains(told)), "{}", verdict.out);
 }
 

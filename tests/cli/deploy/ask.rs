@@ -285,7 +285,7 @@ workflow warm in bench {
     let left = room.end();
     let said = flat(&left.said);
     assert_eq!(left.code, Some(1), "{said}");
-    assert!(said.contains("`bath`: it was set by hand, and nobody confirmed `stop heating bath`"), "{said}");
+    assert!(said.contains("`bath`: it was set by hand, but nobody confirmed `stop heating bath`"), "{said}");
     began(&left.journal, "stop stirring plate");
 }
 

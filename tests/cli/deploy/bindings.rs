@@ -36,20 +36,20 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
         ("[plate]\nport = 3", "is a text"),
         ("[plate]\nport = \"x\"\naddress = \"y\"", "two lines"),
         ("[plate]\nport = \"x\"\nhttp = \"y\"", "two lines"),
-        ("[plate]\nhttp = \"127.0.0.1:1\"", "speaks over a line"),
+        ("[plate]\nhttp = \"127.0.0.1:1\"", "needs a serial line"),
         ("[plate]\nport = \"x\"\ndriver = \"Cavro\"", "no driver `Cavro`"),
         ("[plate]\nby = \"feet\"", "hands"),
         ("[plate]\nport = \"x\"\ntolerance = { temperature = \"5 g\" }", "a number of K"),
-        ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not tell `colour`"),
+        ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not report `colour`"),
         ("[beaker]\nport = \"x\"", "no driver says"),
         ("[plate", "not TOML"),
         ("[plate]\naddress = \"nonsense\"", "the port of `nonsense` is missing"),
         ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is no port"),
         ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is no port"),
-        ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not spoken here"),
-        ("[plate]\nport = \"\"", "a serial port has a path"),
+        ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not supported here"),
+        ("[plate]\nport = \"\"", "a serial port needs a path"),
         ("[plate]\nport = \"tcp://127.0.0.1:1\"", "begins none"),
-        ("[plate]\nport = \"x\"\ncalibration = 3", "a calibration is a table"),
+        ("[plate]\nport = \"x\"\ncalibration = 3", "a calibration must be a table"),
         ("[plate]\nport = \"x\"\ncalibration = { gain = 3 }", "a text with its unit"),
         ("[ghost]\ncalibration = { gain = \"3 W/K\" }", "declares `ghost`"),
     ];
@@ -116,7 +116,7 @@ fn a_shadow_needs_something_to_go_by() {
     write(&dir, "lab.toml", "[plate]\nport = \"x\"");
     let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "shadow", "--journal", "j.jsonl"];
     let ended = matterixc_in(&dir, &args);
-    assert!(ended.code == 1 && ended.err.contains("nothing is compared with the twin"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("no device is compared with the twin"), "{}", ended.err);
     assert!(ended.err.contains("lab.toml:2:8") && !dir.join("j.jsonl").exists(), "{}", ended.err);
 }
 
@@ -149,7 +149,7 @@ fn hands_do_what_has_no_line_if_someone_confirms() {
     write(&dir, "lab.mtx", text);
     let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--speed", "40", "--journal"];
     let nobody = matterixc_in(&dir, &[&given[..], &["one"]].concat());
-    assert!(nobody.code == 1 && nobody.err.contains("nobody is there to confirm it"), "{}", nobody.err);
+    assert!(nobody.code == 1 && nobody.err.contains("nobody can confirm it"), "{}", nobody.err);
     let yes = matterixc_in(&dir, &[&given[..], &["two", "--yes"]].concat());
     assert_eq!(yes.code, 0, "{}", yes.err);
     assert!(yes.err.contains("please do this, then confirm: heat plate to 50 degC"), "{}", yes.err);

@@ -143,7 +143,7 @@ fn a_process_that_stood_still_does_not_pass() {
     process.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
     assert_eq!(process.wait().expect("it ends").code(), Some(1), "{said}");
     let one_line = flat(&said);
-    assert!(one_line.contains("error[diverged]") && one_line.contains("this program stood still for"), "{said}");
+    assert!(one_line.contains("error[diverged]") && one_line.contains("this program was paused for"), "{said}");
     let report = std::fs::read_to_string(dir.join("record/report.json")).expect("a report");
     assert!(report.contains("\"held_up\": [\n    {"), "{report}");
     let record = matterixc_in(&dir, &["verify", "record"]);

@@ -81,7 +81,7 @@ fn a_device_that_the_bindings_name_is_told_from_others() {
     let flat = flat(&ended.err);
     assert_eq!(ended.code, 1, "{flat}");
     assert!(
-        flat.contains("error[other-device]: `scale`: it says that it is `B9034`, and `B9021` is bound here"),
+        flat.contains("error[other-device]: `scale`: it identifies as `B9034`, but `B9021` is bound here"),
         "{flat}"
     );
     assert!(!flat.contains("could not be made safe"), "{flat}");
@@ -132,7 +132,7 @@ fn what_asks_for_an_identity_keeps_a_word_of_the_answer() {
     write(&dir, "lab.toml", "[valve]\naddress = \"localhost:1\"\nidentity = \"7\"\n");
     let ended = deploy(&dir, &[]);
     assert_eq!(ended.code, 1, "{}", ended.err);
-    assert!(ended.err.contains("`ValveLine` cannot ask `valve` who it is"), "{}", ended.err);
+    assert!(ended.err.contains("the driver `ValveLine` cannot ask `valve` for its identity"), "{}", ended.err);
     for (line, said) in [
         ("identity sends \"ID\" expects \"ID {_}\"", "`identity` must keep a word of the reply"),
         ("identity sends \"ID\"", "`identity` must keep a word of the reply"),

@@ -231,7 +231,7 @@ fn what_was_measured_of_labware_is_told_once_a_person_confirms_it() {
     }
     // A file that it runs by itself is not what was confirmed.
     let played = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
-    assert!(played.code == 1 && played.err.contains("nobody is asked here"), "{}", played.err);
+    assert!(played.code == 1 && played.err.contains("this command does not ask anyone"), "{}", played.err);
 }
 
 #[test]
@@ -253,14 +253,16 @@ fn a_line_of_another_kind_is_refused() {
     write(&dir, "lab.toml", "[ot2]\naddress = \"127.0.0.1:1\"\n");
     let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("speaks over HTTP") && ended.err.contains("write `http ="), "{}", ended.err);
+    assert!(ended.err.contains("needs HTTP") && ended.err.contains("write `http ="), "{}", ended.err);
 }
 
 #[test]
 fn where_no_server_can_be_is_found_before_anything_is_opened() {
     let dir = bench("nonsense", "");
-    let cases =
-        [("nonsense", "the port of `nonsense` is missing"), ("https://robot:31950", "`https://` is not spoken here")];
+    let cases = [
+        ("nonsense", "the port of `nonsense` is missing"),
+        ("https://robot:31950", "`https://` is not supported here"),
+    ];
     for (place, said) in cases {
         write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{place}\"\n"));
         let ended = deploy(&dir, &["--mode", "real"]);

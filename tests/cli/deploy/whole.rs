@@ -94,7 +94,7 @@ fn an_emulator_says_why_it_refuses_what_it_understands() {
     emulated.stderr.take().expect("piped").read_to_string(&mut why).expect("text");
     emulated.wait().expect("it ends");
     assert_eq!(why.lines().count(), 1, "{why}");
-    assert!(why.contains("`A1274`, `draw`, is refused, volume underflow: fill in more, or draw less"), "{why}");
+    assert!(why.contains("`A1274`, `draw`, is refused: volume underflow: fill in more, or draw less"), "{why}");
 }
 
 #[test]

@@ -38,7 +38,7 @@ impl Identity {
 
     /// The SHA-256 of the certificate, as `openssl x509 -fingerprint -sha256` writes it: `AB:01:...`.
     pub fn fingerprint(&self) -> Result<String, String> {
-        super::fingerprint_of(&self.chain).ok_or_else(|| "there is no certificate".to_owned())
+        super::fingerprint_of(&self.chain).ok_or_else(|| "it has no certificate".to_owned())
     }
 
     /// Whether clients can be answered with it; why not.
@@ -52,7 +52,7 @@ pub(super) fn chain(pem: &str) -> Result<Vec<CertificateDer<'static>>, String> {
     let all: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(pem.as_bytes()).collect();
     let all = all.map_err(|e| format!("the certificate cannot be read: {e}"))?;
     if all.is_empty() {
-        return Err("there is no certificate in PEM (`-----BEGIN CERTIFICATE-----`) in it".to_owned());
+        return Err("it contains no certificate in PEM (`-----BEGIN CERTIFICATE-----`)".to_owned());
     }
     Ok(all)
 }
