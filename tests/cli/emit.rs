@@ -149,7 +149,7 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
             ),
             &["needs every value before the run", "a.mtx:18"],
         ),
-        ("beside", format!("parallel {{ {tip}; wait 1 s }}\ndrop tip by ot2.left"), &["one thing after the other"]),
+        ("beside", format!("parallel {{ {tip}; wait 1 s }}\ndrop tip by ot2.left"), &["one step after the other"]),
         ("handler", format!("sequence {{ {tip} }} on failure {{ wait 1 s }}\ndrop tip by ot2.left"), &["a handler"]),
         (
             "robots",
@@ -159,7 +159,7 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
         (
             "bin",
             format!("{tip}\ndrop tip into ot2.trash by ot2.left"),
-            &["no command to `drop tip`", "`PipetteCommands`"],
+            &["no command for `drop tip`", "`PipetteCommands`"],
         ),
         (
             "elsewhere",

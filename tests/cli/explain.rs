@@ -44,7 +44,7 @@ fn names_of_failures_are_explained_those_of_a_file_with_it() {
     assert!(own.code == 0 && own.out.contains("Line 2, a hazard"), "{}{}", own.out, own.err);
     let none = matterixc(&["explain", "cold", &file]);
     assert_eq!((none.code, none.out.as_str()), (2, ""));
-    assert!(none.err.contains("nothing in these files is called `cold`"), "{}", none.err);
+    assert!(none.err.contains("these files declare no `cold`"), "{}", none.err);
 }
 
 #[test]

@@ -162,7 +162,7 @@ fn a_gas_stands_in_its_own_equilibrium_alone() {
         ("CO2(g) + O2(g) <-> CO2 + O2", "its right side is not one dissolved species"),
         ("CO2(g) + water <-> H+ + HCO3-", "its right side is not one dissolved species"),
         ("CO2 <-> CO2(g)", "its left side is not one gas"),
-        ("2 CO2(g) <-> 2 CO2", "there is one each"),
+        ("2 CO2(g) <-> 2 CO2", "both coefficients must be 1"),
         ("CO2(g) <-> O2", "does not balance"),
     ];
     let said = |text: String| {

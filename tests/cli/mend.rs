@@ -149,7 +149,7 @@ fn a_file_is_looked_at_again_once_for_each_change_of_what_was_read() {
     put("labs.mtx", &lab.replace("degC", "mL"));
     assert_eq!(looks("unit-mismatch"), 1);
     // Away: one complaint, however much happens beside it.
-    let is_complaint = |line: &String| line.contains("there is no such file");
+    let is_complaint = |line: &String| line.contains("the file does not exist");
     std::fs::remove_file(dir.join("w.mtx")).expect("it was there");
     assert!(complaints.any(|line| is_complaint(&line)));
     for i in 0..3 {

@@ -81,7 +81,7 @@ fn check(name: &str, text: &str) -> String {
 
 /// The place in an offer, as it stands after `at`.
 fn offered(found: &str) -> Option<&str> {
-    let (_, rest) = found.split_once(" is within reach at ")?;
+    let (_, rest) = found.split_once(" would be within reach at ")?;
     let end = rest.find(" mm")? + 3;
     Some(&rest[..end])
 }

@@ -67,7 +67,7 @@ fn what_no_body_has_is_refused_where_it_is_said() {
         ("7:", "error[out-of-range]: `friction` cannot be -0.2"),
         ("8:", "error[unit-mismatch]: `friction` expects a plain number"),
         ("9:", "error[mesh-file]: cannot read `nothing.stl`"),
-        ("10:", "error[type-mismatch]: `collision` is what others run into"),
+        ("10:", "error[type-mismatch]: `collision` must be a shape"),
         ("12:", "error[missing-field]: this asset has an inertia but no mass"),
         ("13:", "error[missing-field]: the centre of mass of this asset is unknown"),
         ("14:", "error[wrong-arguments]: only pieces of `collision` take a place"),

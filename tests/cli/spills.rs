@@ -263,7 +263,7 @@ fn a_capacity_beyond_the_inside_and_an_inside_beyond_the_outside_are_found_where
         ("[(0, 2) mm, (33, 2) mm, (33, 96) mm]", "it has a point at a height of 96 mm, above or below the outside"),
     ] {
         let (code, said) = declared(&format!("shape: turned({outside}, {inside})"));
-        assert!(code == 1 && said.contains("sticks out of its outside") && said.contains(words), "{said}");
+        assert!(code == 1 && said.contains("wider or taller than its outside") && said.contains(words), "{said}");
     }
     // A vessel whose inside is not known may say what it likes.
     assert_eq!(declared("max_volume: 400 mL, shape: cylinder(70 mm, 95 mm)").0, 0);

@@ -181,7 +181,7 @@ fn the_only_instance_that_fits_takes_a_role() {
             .any(|f| f.ends_with(": `where` is decided before the run and cannot depend on it"))
     );
     let elsewhere = "fn f(p: Heater where p.gain > 3 W/K) -> Power = p.power\n";
-    assert!(only("where", elsewhere).starts_with("misplaced: `where` belongs to a parameter"));
+    assert!(only("where", elsewhere).starts_with("misplaced: `where` is only for parameters"));
 }
 
 #[test]
@@ -305,7 +305,7 @@ fn the_reference_protocols_pass_their_tests() {
     // Behind `lost` nobody knows what the robot's hand still holds.
     assert!(ended.code == 0 && ended.out.ends_with("1 warning\n"), "{}", ended.out);
     assert!(
-        ended.out.starts_with("warning[unfinished]: `two_samples` can end, and `kmr` is left holding"),
+        ended.out.starts_with("warning[unfinished]: `kmr` may be left holding when `two_samples` ends"),
         "{}",
         ended.out
     );

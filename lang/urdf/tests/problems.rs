@@ -81,7 +81,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     ("<mimic joint=\"turn\"", "<mimic joint=\"slide\"", "line 15: joint `slide` follows itself"),
     ("type=\"prismatic\"", "type=\"planar\"", "line 15: joint `slide` is `planar`"),
     ("type=\"prismatic\"", "type=\"round\"", "line 15: `round` is not a type of joint"),
-    ("<box size=\"1 1 1\"/>", "<cone size=\"1 1 1\"/>", "line 5: `cone` is no shape"),
+    ("<box size=\"1 1 1\"/>", "<cone size=\"1 1 1\"/>", "line 5: `cone` is not a shape"),
     ("<box size=\"1 1 1\"/>", "<box size=\"1 0 1\"/>", "line 5: `size` of `box` is 0, but must be above 0"),
     ("<box size=\"1 1 1\"/>", "", "line 5: `geometry` must have one shape"),
     ("rgba=\"1 0 0 1\"", "rgba=\"255 0 0 1\"", "line 5: 255 in `rgba` is not between 0 and 1"),
@@ -90,7 +90,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (
         "<robot name=\"two\">",
         "<robot xmlns:xacro=\"http://x/xacro\"><xacro:include/>",
-        "`xacro:include` is to be expanded",
+        "`xacro:include` must be expanded",
     ),
     (
         "  <link name=\"hand\"/>",
@@ -117,10 +117,10 @@ fn circles_are_found() {
     let links = "<link name='a'/><link name='b'/><link name='c'/>";
     let all = [joint("j", "a", "b"), joint("k", "b", "c"), joint("l", "c", "a")].concat();
     let problem = read(&format!("<robot>{links}{all}</robot>")).expect_err("a circle");
-    assert!(problem.message.contains("round in a circle"), "{problem}");
+    assert!(problem.message.contains("they form a circle"), "{problem}");
     let some = [joint("k", "b", "c"), joint("l", "c", "b")].concat();
     let problem = read(&format!("<robot>{links}{some}</robot>")).expect_err("a circle");
-    assert!(problem.message.contains("`k` is part of a circle"), "{problem}");
+    assert!(problem.message.contains("`k` is part of a separate circle"), "{problem}");
 }
 
 #[test]

@@ -236,18 +236,18 @@ mod tests {
         let cases = [
             ("nonsense", "the port of `nonsense` is missing"),
             ("robot:", "the port of `robot` is missing"),
-            ("robot:0", "`0` is no port"),
-            ("robot:65536", "`65536` is no port"),
-            ("robot:+7", "`+7` is no port"),
-            ("robot:http", "`http` is no port"),
-            (":31950", "no host"),
-            ("", "no host"),
-            ("300.1.1.1:80", "neither the name nor the number"),
-            ("a robot:80", "neither the name nor the number"),
+            ("robot:0", "`0` is not a port"),
+            ("robot:65536", "`65536` is not a port"),
+            ("robot:+7", "`+7` is not a port"),
+            ("robot:http", "`http` is not a port"),
+            (":31950", "the host is missing"),
+            ("", "the host is missing"),
+            ("300.1.1.1:80", "is not a host name or address"),
+            ("a robot:80", "is not a host name or address"),
             ("::1", "in brackets"),
-            ("[robot]:80", "neither the name nor the number"),
+            ("[robot]:80", "is not a host name or address"),
             ("https://robot:80", "`https://` is not supported here"),
-            ("robot:80/runs", "`80/runs` is no port"),
+            ("robot:80/runs", "`80/runs` is not a port"),
         ];
         for (text, wanted) in cases {
             let why = Place::Http(text.to_owned()).checked().expect_err(text).why;

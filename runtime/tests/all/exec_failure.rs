@@ -23,7 +23,7 @@ fn an_unhandled_failure_ends_the_run_with_its_trace() {
     assert_eq!(shown.headline, "the run failed with `slip`: on purpose");
     assert_eq!(shown.span(), lab.program.plan.get(fail).span);
     assert_eq!(shown.labels.len(), 4);
-    assert_eq!(shown.labels[2].text, "in `Skill`, begun at 0 s");
+    assert_eq!(shown.labels[2].text, "in `Skill`, started at 0 s");
 }
 
 #[test]

@@ -88,7 +88,10 @@ fn what_is_known_of_the_end_decides_whether_a_device_is_safe() {
     write(&dir, "lab.mtx", text);
     let ended = goes(&dir, "breaks", &pump.address, &other.address, "");
     let said = flat(&ended.err);
-    assert!(ended.code == 1 && said.contains("could not be made safe: `pump`: it took what makes it safe"), "{said}");
+    assert!(
+        ended.code == 1 && said.contains("could not be made safe: `pump`: it accepted the `safe` command"),
+        "{said}"
+    );
 }
 
 /// What a device is at the end is judged by what it shows, also where that is a reading of a true value.

@@ -23,17 +23,17 @@ fn refused_bindings_leave_no_journal_behind() {
     write(&dir, "j.jsonl", "something else\n");
     let ended = matterixc_in(&dir, &args);
     assert_eq!(ended.code, 2, "{}", ended.err);
-    assert!(ended.err.contains("give the journal another name"), "{}", ended.err);
+    assert!(ended.err.contains("choose another name for the journal"), "{}", ended.err);
 }
 
 #[test]
 fn what_is_wrong_with_bindings_is_said_where_it_stands() {
     let cases = [
         ("[plat]\nport = \"x\"", "has no `plat`"),
-        ("plate = 3", "bound with a table"),
+        ("plate = 3", "`plate` needs a table"),
         ("[plate]\nprot = \"x\"", "has no `prot`"),
-        ("[plate]\n", "is not said"),
-        ("[plate]\nport = 3", "is a text"),
+        ("[plate]\n", "has no place"),
+        ("[plate]\nport = 3", "must be a text"),
         ("[plate]\nport = \"x\"\naddress = \"y\"", "two lines"),
         ("[plate]\nport = \"x\"\nhttp = \"y\"", "two lines"),
         ("[plate]\nhttp = \"127.0.0.1:1\"", "needs a serial line"),
@@ -41,14 +41,14 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
         ("[plate]\nby = \"feet\"", "hands"),
         ("[plate]\nport = \"x\"\ntolerance = { temperature = \"5 g\" }", "a number of K"),
         ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not report `colour`"),
-        ("[beaker]\nport = \"x\"", "no driver says"),
-        ("[plate", "not TOML"),
+        ("[beaker]\nport = \"x\"", "`beaker` has no driver"),
+        ("[plate", "not valid TOML"),
         ("[plate]\naddress = \"nonsense\"", "the port of `nonsense` is missing"),
-        ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is no port"),
-        ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is no port"),
+        ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is not a port"),
+        ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is not a port"),
         ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not supported here"),
         ("[plate]\nport = \"\"", "a serial port needs a path"),
-        ("[plate]\nport = \"tcp://127.0.0.1:1\"", "begins none"),
+        ("[plate]\nport = \"tcp://127.0.0.1:1\"", "is not one"),
         ("[plate]\nport = \"x\"\ncalibration = 3", "a calibration must be a table"),
         ("[plate]\nport = \"x\"\ncalibration = { gain = 3 }", "a text with its unit"),
         ("[ghost]\ncalibration = { gain = \"3 W/K\" }", "declares `ghost`"),
@@ -64,7 +64,7 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
 fn a_step_that_nobody_is_told_of_is_found_first() {
     let err = found("undriven", HEAT, "");
     assert_eq!(err.matches("error[undriven]").count(), 1, "one device, one finding: {err}");
-    assert!(err.contains("lab.mtx:10") && err.contains("nor at 3 other places"), "{err}");
+    assert!(err.contains("lab.mtx:10") && err.contains("the same at 3 other places"), "{err}");
     assert!(err.contains("[plate]\n") && err.contains("port = \"/dev/ttyUSB0\""), "{err}");
 }
 
@@ -128,7 +128,7 @@ fn a_decision_on_a_device_that_is_not_bound_says_how_to_bind_it() {
         .replace("    wait until", "    let load = scale.weight\n    if load > 1 kg { wait 1 s }\n    wait until");
     let err = found("unasked", &text, "[plate]\nport = \"x\"");
     let flat = flat(&err);
-    assert!(err.contains("error[unobserved]") && flat.contains("do not say where `scale` is"), "{err}");
+    assert!(err.contains("error[unobserved]") && flat.contains("`scale` has no binding"), "{err}");
     assert!(err.contains("[scale]\n") && !err.contains("undriven"), "{err}");
 }
 

@@ -105,7 +105,7 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
     write(&dir, "journal", &shut);
     let ended = resumed(&dir, "lab.toml");
     let one_line = flat(&ended.err);
-    assert!(ended.code == 1 && one_line.contains("could not be gone on with"), "{}", ended.err);
+    assert!(ended.code == 1 && one_line.contains("could not be resumed"), "{}", ended.err);
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn another_program_another_seed_and_another_end_are_refused() {
     for dir in [&dir, &seeded_dir] {
         let right = resumed(dir, "lab.toml");
         let one_line = flat(&right.err);
-        assert!(right.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
+        assert!(right.code == 1 && one_line.contains("were made safe when it could not be resumed"), "{one_line}");
         assert!(one_line.contains("these devices were made safe: `plate`"), "{one_line}");
     }
     let again = matterixc_in(&dir, &DEPLOY);
@@ -399,7 +399,7 @@ fn where_nothing_can_be_kept_beside_a_journal_nothing_is_sent() {
         let ended = deployed().expect("the command starts");
         let said = flat(&String::from_utf8_lossy(&ended.stderr));
         assert_eq!(ended.status.code(), Some(1), "{said}");
-        assert!(said.contains("its counterfoil: there is no folder for it"), "{said}");
+        assert!(said.contains("its counterfoil: it has no folder"), "{said}");
         assert!(device.heard().is_empty(), "{:?}", device.heard());
         assert!(!dir.join("journal").exists(), "another attempt finds none");
     }

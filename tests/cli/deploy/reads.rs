@@ -314,5 +314,5 @@ fn a_line_that_owes_an_answer_and_is_never_silent_is_named() {
     let ended = slow("restless", &[2100, 60_000], true);
     let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("error[device-garbled]"), "{said}");
-    assert!(said.contains("it owes an answer to `T?`, and nothing else is said to it before"), "{said}");
+    assert!(said.contains("it still owes a reply to `T?`: nothing else is sent before"), "{said}");
 }

@@ -40,9 +40,13 @@ fn a_record_is_whole_and_is_gone_through_again_to_the_last_bit() {
     let digest = ended.err.split("the record is sealed: ").nth(1).and_then(|r| r.split_whitespace().next());
     let checked = verified(&dir);
     assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
-    for line in
-        ["are as they were sealed", "is one chain", "the one that was carried out", "to the last bit", "says what"]
-    {
+    for line in [
+        "are unchanged since they were sealed",
+        "an unbroken chain",
+        "the one of the journal",
+        "to the last bit",
+        "agrees with",
+    ] {
         assert!(checked.out.contains(line), "{line}: {}", checked.out);
     }
     assert!(digest.is_some_and(|d| checked.out.contains(d)), "{} {}", ended.err, checked.out);
@@ -75,7 +79,7 @@ fn a_record_that_was_changed_anywhere_is_known_for_one() {
         std::fs::write(&path, &changed).expect("written");
         let checked = verified(&dir);
         assert_eq!(checked.code, 1, "{file}: {}{}", checked.out, checked.err);
-        assert!(checked.out.contains(&format!("wrong: `{file}` is not as it was sealed")), "{}", checked.out);
+        assert!(checked.out.contains(&format!("wrong: `{file}` has changed since it was sealed")), "{}", checked.out);
         std::fs::write(&path, &before).expect("written");
     }
     // Who writes the seals anew is found out by the replay.
@@ -86,7 +90,7 @@ fn a_record_that_was_changed_anywhere_is_known_for_one() {
     std::fs::write(record.join("journal.jsonl"), journal).expect("written");
     std::fs::write(record.join("more"), "more").expect("written");
     let checked = verified(&dir);
-    assert!(checked.code == 1 && checked.out.contains("`more` is no part"), "{}", checked.out);
+    assert!(checked.code == 1 && checked.out.contains("`more` is not part"), "{}", checked.out);
 }
 
 #[test]

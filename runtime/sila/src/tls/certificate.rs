@@ -101,6 +101,6 @@ mod tests {
         assert_eq!(written.len(), 95);
         let other = own("7f3f5b0e-8c57-4d56-9a3e-2c1f0d9b6a11", &hosts).expect("it is made");
         let mixed = super::Identity { chain: identity.chain, key: other.key };
-        assert!(mixed.is_sound().is_err_and(|why| why.contains("do not go together")));
+        assert!(mixed.is_sound().is_err_and(|why| why.contains("do not belong together")));
     }
 }

@@ -77,7 +77,7 @@ mod tests {
             ("ana", "line 1: it is not `NAME:HASH`"),
             ("\nana:secret", "line 2: the password of `ana` is not hashed"),
             ("ana:{SHA}W6ph5Mm5Pz8GgiULbPgzG37mj9g=", "not hashed with bcrypt"),
-            (&format!("ana:{}", hash.replace("$04$", "$31$")), "too dear"),
+            (&format!("ana:{}", hash.replace("$04$", "$31$")), "takes too long"),
             (&format!("ana:{hash}\nana:{hash}"), "line 2: `ana` is listed twice"),
             ("# nobody", "names no user"),
         ] {
