@@ -53,7 +53,7 @@ pub fn tested<'a>(tables: &Tables<'a>, test: DeclId) -> Result<Option<Tested<'a>
     };
     let mut stmts = body.stmts.iter().enumerate().filter(|(_, s)| !matches!(s.kind, StmtKind::Error));
     let Some((at, first)) = stmts.next() else {
-        let headline = format!("`{}` tests nothing", name.text);
+        let headline = format!("the test `{}` has no steps", name.text);
         let d = misplaced(name.span, headline, "no steps");
         return Err(Box::new(d.help("start with the workflow: `run NAME { parameter: value }`")));
     };

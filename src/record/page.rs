@@ -105,7 +105,7 @@ pub fn page(report: &Report) -> String {
         }),
     );
     out += &table(
-        "What went wrong",
+        "Failures",
         &["lab time, s", "code", "what"],
         report.faults.iter().map(|f| vec![show_number(f.lab_time), f.code.clone(), f.text.clone()]),
     );

@@ -230,7 +230,7 @@ test cold { run cook { plate: hp1 }; expect plate.temperature > 50 degC }
 #[test]
 fn a_test_is_checked_with_its_file() {
     for (name, test, wanted) in [
-        ("nothing", "test t { }", "misplaced: `t` tests nothing"),
+        ("nothing", "test t { }", "misplaced: the test `t` has no steps"),
         ("steps", "test t { wait 1 s }", "misplaced: a test must start with the workflow that it runs"),
         ("after", "test t { run cook; wait 1 s }", "misplaced: after the run of its workflow a test can only `expect`"),
         ("workflow", "test t { run cok }", "unknown-name: unknown workflow `cok`"),

@@ -49,7 +49,7 @@ fn what_cannot_be_renamed_is_said() {
     assert_eq!(why("= |Beaker250mL on", "Cup"), "`Beaker250mL` belongs to the standard library");
     assert_eq!(why("45 deg|C", "grad"), "`degC` belongs to the standard library");
     assert_eq!(why("std::|heating", "warming"), "`heating` is a module, named by its file");
-    assert_eq!(why("look.|elapsed", "time"), "`elapsed` is a word of the language: how long it has lasted so far");
+    assert_eq!(why("look.|elapsed", "time"), "`elapsed` is a word of the language: its duration so far");
     assert_eq!(why("lid == |open", "ajar"), "`open` is a word of a state: types are equal if their words are");
     assert_eq!(why("|ambient: 22", "around"), "laws read the setting `ambient` by this name");
     assert_eq!(why("cook(|target", "wait"), "`wait` cannot be the name of a parameter");

@@ -108,7 +108,7 @@ impl Script<'_> {
     fn body(&mut self, performance: &Performance<'_>, travels: &[Travel]) {
         let own: Vec<&Travel> = travels.iter().filter(|t| t.owner == self.arm).collect();
         if let Some(start) = own.first().and_then(|t| t.points.first()) {
-            self.line("# to where the arm stands when the workflow begins");
+            self.line("# to the position of the arm at the start of the workflow");
             let positions = list(&start.positions);
             self.line(&format!("movej({positions}, a=1.0, v=0.5)"));
         }
@@ -188,7 +188,7 @@ impl Script<'_> {
         let _ = writeln!(out, "# workflow {}, arm {} ({})", program.plan.workflow, arm.name, arm.kind);
         let _ = writeln!(out, "def {}():", word(&program.plan.workflow).replacen("do_", "workflow_", 1));
         if !self.functions.is_empty() {
-            out.push_str("  # what the arm does not do itself: replace the bodies by calls of your devices\n");
+            out.push_str("  # steps of other devices: replace the bodies by calls of your devices\n");
         }
         for (name, text) in &self.functions {
             let _ = write!(out, "  def {name}():\n  {text}  end\n");

@@ -241,13 +241,13 @@ impl Writer {
             out,
             "//! Equilibria of {title}, a database of PHREEQC (Parkhurst and Appelo, U.S. Geological Survey).\n//!"
         );
-        out.push_str("//! Constants are at 25 degC and an ionic strength of 0. A species that the library has not has the volume of the database, or\n");
-        out.push_str("//! none where that gives none; its heat capacity counts as 0, for the database has none.\n");
+        out.push_str("//! Constants are at 25 degC and an ionic strength of 0. A species that the library lacks has the volume of the\n");
+        out.push_str("//! database, or none if the database gives none; its heat capacity counts as 0, because the database has none.\n");
         if !self.without_activity.is_empty() {
             let names: BTreeSet<&String> = self.without_activity.iter().collect();
             let names: Vec<&str> = names.into_iter().map(String::as_str).collect();
             out.push_str(
-                "//!\n//! The database has numbers for activity coefficients of these, and the library none:\n",
+                "//!\n//! The database has activity coefficients of these species, but the library does not:\n",
             );
             let mut line = String::from("//!");
             for name in names {

@@ -586,7 +586,7 @@ mod tests {
             ("4 digits", 3e-4),
         ] {
             let why = put(text, &ml, number).expect_err(text);
-            assert!(why.contains("it would be"), "{text} {number}: {why}");
+            assert!(why.contains("it would become"), "{text} {number}: {why}");
         }
         for (text, number, sent) in [
             ("06.3", 0.0, "00.000"),

@@ -253,7 +253,7 @@ fn two_processes_do_not_speak_over_one_line() {
     assert_eq!(second.code, 1, "{}", second.err);
     let said = flat(&second.err);
     assert!(
-        said.contains(&format!("is taken: process {} (", first.id())) && said.contains("nothing was said"),
+        said.contains(&format!("is in use: process {} (", first.id())) && said.contains("nothing was sent"),
         "{said}"
     );
     assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));

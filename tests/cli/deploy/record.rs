@@ -134,7 +134,7 @@ fn a_record_of_a_deployment_that_failed_is_gone_through_again_too() {
     let checked = verified(&dir);
     assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
     let page = std::fs::read_to_string(dir.join("signed/report.md")).expect("a page");
-    assert!(page.contains("## What went wrong") && page.contains("## Made safe"), "{page}");
+    assert!(page.contains("## Failures") && page.contains("## Made safe"), "{page}");
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn what_is_refused_beforehand_leaves_no_record() {
     let (dir, _) = room("refused");
     write(&dir, "lab.toml", "[plate]\naddress = \"127.0.0.1:1\"\n");
     let ended = matterixc_in(&dir, &DEPLOY);
-    assert!(ended.code == 1 && ended.err.contains("nothing was said"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("nothing was sent"), "{}", ended.err);
     assert!(!dir.join("signed").exists());
 }
 

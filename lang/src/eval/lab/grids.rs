@@ -210,7 +210,7 @@ impl<'a> Elaborator<'a> {
             let kind = self.kind_names(id);
             self.report(
                 Diagnostic::error(codes::MISSING_FIELD, span, format!("`{kind}` has no `{}`", name.text), "not given")
-                    .because(name.span, "asked for here")
+                    .because(name.span, "required here")
                     .help(format!("give them in the asset: `{}[A1 .. H12] = Well {{ ... }}`", name.text)),
             );
             return;

@@ -77,9 +77,10 @@ impl Planner<'_, '_> {
                 "a text framing cannot carry the bytes of a number",
                 "add `hex`, or use a framing with `carries: bytes`",
             )),
-            Speech::Free | Speech::Calls if !form.is_plain() => {
-                Some(("a server takes numbers in decimal form", "as in `:.1`, or `:.0 * 10` where it counts tenths"))
-            }
+            Speech::Free | Speech::Calls if !form.is_plain() => Some((
+                "a server takes numbers in decimal form",
+                "write it as in `:.1`, or `:.0 * 10` if it counts tenths",
+            )),
             _ => None,
         };
         if let Some((headline, help)) = wrong {

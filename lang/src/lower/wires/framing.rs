@@ -168,7 +168,7 @@ impl<'a> Planner<'a, '_> {
         let name = name.trim();
         let form = match form.map(|f| Form::parse(f, false)) {
             Some(Ok(form)) => Some(form),
-            Some(Err(why)) => return self.no_framing(at, &why, "in a layout", "as in `{length :u16 big}`"),
+            Some(Err(why)) => return self.no_framing(at, &why, "in a layout", "write it as in `{length :u16 big}`"),
             None => None,
         };
         let fixed = form.clone().filter(|f| f.width().is_some() && is_whole(f));
@@ -184,7 +184,12 @@ impl<'a> Planner<'a, '_> {
             ("number", _, Some(form)) => Some(Part::Number(form)),
             ("address" | "length" | "check" | "number", ..) => {
                 let headline = format!("`{name}` needs the format of a whole number of fixed width");
-                self.no_framing(at, &headline, "another format", "as in `:u8`, `:u16 little`, `:02` or `:u8 hex`")
+                self.no_framing(
+                    at,
+                    &headline,
+                    "another format",
+                    "write it as in `:u8`, `:u16 little`, `:02` or `:u8 hex`",
+                )
             }
             _ => {
                 let headline = format!("a frame has no part `{name}`");
@@ -214,7 +219,7 @@ impl<'a> Planner<'a, '_> {
                 Some(Counted { over: self.stretch(value)?, more: more as i32 })
             }
             _ => {
-                let help = "as in `length: count(data)` or `length: count(address .. data) + 1`";
+                let help = "write it as in `length: count(data)` or `length: count(address .. data) + 1`";
                 self.no_framing(field.span, "`length` must count a part of the frame", "invalid", help)
             }
         }
@@ -230,7 +235,7 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         };
         let Some((name, [Arg { name: None, value: over }, more @ ..], at)) = call else {
-            let help = "as in `check: sum8(data)` or `check: crc16_modbus(address .. data)`";
+            let help = "write it as in `check: sum8(data)` or `check: crc16_modbus(address .. data)`";
             return self.no_framing(field.span, "`check` must be a checksum over a part of the frame", "invalid", help);
         };
         let over = self.stretch(over)?;
@@ -263,7 +268,7 @@ impl<'a> Planner<'a, '_> {
                 e.span,
                 "the width of a CRC must be 8, 16 or 32",
                 "another width",
-                "as in `width: 16`",
+                "write it as in `width: 16`",
             );
         }
         let reflected = match given("reflected").map(|e| &*e.kind) {
@@ -275,8 +280,7 @@ impl<'a> Planner<'a, '_> {
         let (Some(width), Some(polynomial), Some(initial), Some(reflected), Some(last), 5) =
             (all.0, all.1, all.2, all.3, all.4, args.len())
         else {
-            let help =
-                "as in `crc(data, width: 16, polynomial: \"1021\", initial: \"FFFF\", reflected: false, final: \"0\")`";
+            let help = "write it as in `crc(data, width: 16, polynomial: \"1021\", initial: \"FFFF\", reflected: false, final: \"0\")`";
             return self.no_framing(at, "a CRC needs five parameters", "not these", help);
         };
         let fits = |value: u32| width == 32.0 || f64::from(value) < 2f64.powf(width);
@@ -370,7 +374,7 @@ impl<'a> Planner<'a, '_> {
                         *span,
                         "the length does not count the message",
                         "not over `data`",
-                        "as in `count(data)`",
+                        "write it as in `count(data)`",
                     );
                 }
             }
@@ -400,7 +404,7 @@ impl<'a> Planner<'a, '_> {
                         *span,
                         "this checksum covers no part of the frame",
                         "empty range",
-                        "as in `sum8(begin .. data)`",
+                        "write it as in `sum8(begin .. data)`",
                     );
                 }
                 let bits = check.sum.bits();
@@ -411,7 +415,7 @@ impl<'a> Planner<'a, '_> {
                         at,
                         &headline,
                         "too narrow",
-                        "as in `{check :u16 big}` or `{check :u16 hex}`",
+                        "write it as in `{check :u16 big}` or `{check :u16 hex}`",
                     );
                 }
             }

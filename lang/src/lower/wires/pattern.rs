@@ -105,7 +105,7 @@ impl Planner<'_, '_> {
             return None;
         }
         if !crate::syntax::is_name(name) {
-            self.wrong(at, "`<...>` must contain a name", "not a name", "as in `{<serial>}`");
+            self.wrong(at, "`<...>` must contain a name", "not a name", "write it as in `{<serial>}`");
             return None;
         }
         Some(name.to_owned())

@@ -71,9 +71,9 @@ impl<'a> Planner<'a, '_> {
         if !missing.is_empty() {
             let headline = format!("the line of this driver needs {}", list(&missing));
             let help = match name.text.as_str() {
-                "sila" => "as in `over sila(feature: \"org.example/heating/Hotplate/v1\", timeout: 5 s)`",
-                "http" => "as in `over http(timeout: 1 min)`",
-                _ => "as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`",
+                "sila" => "write it as in `over sila(feature: \"org.example/heating/Hotplate/v1\", timeout: 5 s)`",
+                "http" => "write it as in `over http(timeout: 1 min)`",
+                _ => "write it as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`",
             };
             self.wrong(at, &headline, "these settings have no defaults", help);
             return None;
@@ -105,7 +105,7 @@ impl<'a> Planner<'a, '_> {
         let timeout = self.duration_node(e, &mut Scope::module(module), "timeout")?;
         let known = self.lab.known(timeout)?;
         if known <= 0.0 {
-            self.wrong(e.span, "a timeout must be above 0 s", "not above 0 s", "as in `timeout: 1 s`");
+            self.wrong(e.span, "a timeout must be above 0 s", "not above 0 s", "write it as in `timeout: 1 s`");
             return None;
         }
         Some(known)
@@ -231,7 +231,7 @@ impl<'a> Planner<'a, '_> {
             (None, None) | (Some(None), Some(_)) => Some(()),
             (Some(Some(form)), Some(address)) => {
                 let written =
-                    address.parse::<f64>().map_err(|_| "it is no number".to_owned()).and_then(|n| form.write(n));
+                    address.parse::<f64>().map_err(|_| "it is not a number".to_owned()).and_then(|n| form.write(n));
                 if let Err(why) = written {
                     let headline = format!("`{address}` is not an address of this framing: {why}");
                     self.wrong(at, &headline, "does not fit", "the framing defines the format of an address");

@@ -117,7 +117,7 @@ impl Lower<'_> {
                             let span = self.place(start + at - 1, start + at + 1);
                             let (headline, help) = match code {
                                 Some(_) => ("a brace starts a value here", "write `{{` or `}}`"),
-                                None => ("a byte needs two hexadecimal digits", "as in `\\x02`"),
+                                None => ("a byte needs two hexadecimal digits", "write it as in `\\x02`"),
                             };
                             self.report(Diagnostic::error(codes::SYNTAX, span, headline, "here").help(help));
                         }

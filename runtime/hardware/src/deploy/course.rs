@@ -341,14 +341,14 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
         DeviceError::Lost(_) | DeviceError::Silent(_) => "cannot be reached",
         DeviceError::Unsaid(_) => "cannot be addressed",
         DeviceError::Mistaken(_) => "is another device",
-        DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is not what it is bound as",
+        DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is another kind of device than bound",
     };
     let headline = format!("`{device}` {what}: {}", trouble.text());
     let d = Diagnostic::error(trouble.code(), *at, headline, "bound here");
     d.help(if goes_on {
         "nothing was sent to any device; resume the journal with `--resume` when the device is back"
     } else {
-        "nothing was said to any device"
+        "nothing was sent to any device"
     })
 }
 
