@@ -259,8 +259,11 @@ impl Interpreter<'_, '_> {
         let (name, span) = (self.lab.spoken_name(about), self.declared_at(about));
         let what = condition.refusal.as_ref().map_or(condition.text.clone(), |r| r.failure.replace('_', " "));
         let words = self.worded(condition, facts);
-        let said = if words.is_empty() { self.measured(condition, facts) } else { words.clone() }.join(", ");
-        let mut d = Diagnostic::error(code, span, format!("`{name}` is invalid at the start: {what}"), said);
+        let (headline, said) = match words.is_empty() {
+            true => (format!("`{name}` is invalid at the start: {what}"), self.measured(condition, facts).join(", ")),
+            false => (words.join(", "), "true from the start".to_owned()),
+        };
+        let mut d = Diagnostic::error(code, span, headline, said);
         if span != condition.span && (words.is_empty() || !self.in_library(condition.span)) {
             d = d.because(condition.span, format!("needed here: `{}`", condition.text));
         }
@@ -312,7 +315,11 @@ impl Interpreter<'_, '_> {
         let (span, said) = changed.into_iter().next()?;
         let name = self.lab.spoken_name(end.instance);
         let how = condition.refusal.as_ref().map_or("unfinished".to_string(), |r| r.failure.replace('_', " "));
-        let headline = format!("`{name}` is {how} {ends}");
+        let words = self.worded(condition, ended);
+        let headline = match words.is_empty() {
+            true => format!("`{name}` is {how} {ends}"),
+            false => format!("{} {ends}", words.join(", ")),
+        };
         let mut d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
         if !self.in_library(condition.span) {
             d = d.because(condition.span, format!("required here at the end: `{}`", condition.text));
