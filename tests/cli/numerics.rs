@@ -114,7 +114,7 @@ fn what_is_unlimited_is_shown_as_that() {
     for command in [["check", "--no-cache", "endless.mtx"].as_slice(), &["run", "endless.mtx"]] {
         let said = matterixc_in(&dir, command);
         let all = said.out + &said.err;
-        assert!(said.code == 1 && all.contains("is unlimited, allowed is 2 m .. 5 m"), "{all}");
+        assert!(said.code == 1 && all.contains("is unlimited, the allowed range is 2 m .. 5 m"), "{all}");
         assert!(all.contains("is unlimited, at most 5 m") && all.contains("is 1 m, at least 2 m"), "{all}");
         assert!(!all.contains("inf"), "{all}");
     }

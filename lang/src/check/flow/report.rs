@@ -545,7 +545,7 @@ impl Interpreter<'_, '_> {
             let show = |k: &AbstractValue| shown(k, |v| c.unit.show(v));
             let limits = match (low, high) {
                 (Some(l), Some(_)) if c.low == c.high => format!("must be {}", show(&l)),
-                (Some(l), Some(h)) => format!("allowed is {} .. {}", show(&l), show(&h)),
+                (Some(l), Some(h)) => format!("the allowed range is {} .. {}", show(&l), show(&h)),
                 (Some(l), None) => format!("{} {}", if c.strict { "must be more than" } else { "at least" }, show(&l)),
                 (None, Some(h)) => format!("{} {}", if c.strict { "must be less than" } else { "at most" }, show(&h)),
                 (None, None) => continue,
