@@ -149,5 +149,5 @@ workflow go in bench {
         format!("{HEAD}{lines}").replace("bench = Optical", "store = Optical").replace("on bench at", "on store at");
     let found = check("gap", &text);
     assert!(found.contains("`kuka` cannot drive to `cup`"), "{found}");
-    assert!(found.contains("between `left` and `right` are 400 mm, and `kuka` needs 6"), "{found}");
+    assert!(found.contains("the gap between `left` and `right` is 400 mm wide, but `kuka` needs 6"), "{found}");
 }

@@ -145,7 +145,7 @@ fn a_hole_centres_what_its_clearance_takes_and_refuses_the_rest() {
     let ended = run(&dir, &["--unseen", "2mm,1deg", "--out", "beside"]);
     let said = flat(&ended.err);
     assert_eq!(ended.code, 1, "{}", ended.err);
-    assert!(said.contains("failed with `collision`: `vial` hits the rim of `block[A1]`: it comes "), "{said}");
+    assert!(said.contains("failed with `collision`: `vial` hits the rim of `block[A1]`: it is "), "{said}");
     assert!(said.contains("off the middle of the hole, which leaves 1.5 mm on either side"), "{said}");
     // It stops at the rim, before its motion would have ended.
     assert!(ended.out.contains("failed after 3.2"), "{}", ended.out);

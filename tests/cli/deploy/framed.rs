@@ -196,7 +196,7 @@ fn a_number_without_room_is_found_before_anything_is_sent() {
     let dir = bench("no_room", &text, "bath", "127.0.0.1:1");
     let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
     assert!(ended.code == 1 && ended.out.is_empty(), "{}", ended.out);
-    assert!(ended.err.contains("37 degC cannot be sent in this form"), "{}", ended.err);
+    assert!(ended.err.contains("37 degC cannot be sent in this format"), "{}", ended.err);
 }
 
 /// Findings of `check`, each at a framing or at a line of a driver.

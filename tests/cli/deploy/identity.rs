@@ -30,7 +30,7 @@ fn a_journal_is_not_gone_on_with_on_another_device() {
         let flat = flat(&ended.err);
         assert_eq!(ended.code, 1, "{flat}");
         assert!(flat.contains("error[other-device]: `scale` is another device"), "{flat}");
-        assert!(flat.contains("`B9034`, and `B9021` was there before"), "{flat}");
+        assert!(flat.contains("`B9034`, but `B9021` was there before"), "{flat}");
         assert!(ended.err.contains("lab.toml:2:11") && ended.err.contains("with `--resume`"), "{}", ended.err);
     }
     assert_eq!(second.heard(), ["I4", "I4"], "it is asked who it is, and nothing else");
