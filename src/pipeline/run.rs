@@ -93,8 +93,8 @@ pub fn run<'a>(
     let options = RunOptions { seed, fidelity, limits, process, unseen, really, ..RunOptions::default() };
     let recording = Recording::within(program, choices.keep.error());
     let mut follower = Follower { recording, sampler: Sampler::new(&program.model), progress };
-    let moved = choices.moved.iter().map(|moved| (moved, "is", "its place"));
-    let unseen = choices.unseen.moved().iter().map(|moved| (moved, "is really", "its assumed place"));
+    let moved = choices.moved.iter().map(|moved| (moved, "stands", "its place"));
+    let unseen = choices.unseen.moved().iter().map(|moved| (moved, "really stands", "its assumed place"));
     for (moved, stands, from) in moved.chain(unseen) {
         let instance = program.scene.get(moved.thing);
         let [x, y] = moved.shift.map(|m| m * 1e3);
