@@ -120,7 +120,11 @@ fn a_vial_within_the_room_of_the_fingers_is_picked_and_one_beyond_is_missed() {
     let dir = lab("unseen_pick", "20 mm", "pick vial by panda\n    put back vial by panda");
     let ended = run(&dir, &["--unseen", "2mm,1deg", "--out", "near"]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
-    assert!(ended.out.contains("`vial` really stands (") && ended.out.contains("from its assumed place"), "{}", ended.out);
+    assert!(
+        ended.out.contains("`vial` really stands (") && ended.out.contains("from its assumed place"),
+        "{}",
+        ended.out
+    );
     let judged = matterixc_in(&dir, &["verify", "near"]);
     assert!(judged.out.contains("nothing wrong") && judged.out.contains("1 grips, off by "), "{}", judged.out);
     assert!(!judged.out.contains("off by 0.00 mm"), "the recording has the true pose: {}", judged.out);
