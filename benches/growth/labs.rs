@@ -11,7 +11,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub const KINDS: [Kind; 6] = [
+pub const KINDS: [Kind; 7] = [
     Kind {
         name: "beakers",
         text: "heated beakers, each on its own hotplate",
@@ -28,8 +28,14 @@ pub const KINDS: [Kind; 6] = [
     Kind { name: "plates", text: "plates filled well by well", program: plates, sizes: &[1, 2, 4, 8] },
     Kind {
         name: "titrations",
-        text: "carbonate solutions, each titrated with acid at equilibrium",
+        text: "carbonate solutions, into each of which acid flows, at equilibrium",
         program: titrations,
+        sizes: &[6, 24, 96],
+    },
+    Kind {
+        name: "wells",
+        text: "wells of a plate titrated in twelve strokes each, at equilibrium",
+        program: wells,
         sizes: &[6, 24, 96],
     },
     Kind { name: "species", text: "species with twice as many reactions", program: species, sizes: &[10, 100, 1000] },
@@ -132,6 +138,25 @@ fn plates(count: usize) -> String {
         );
     }
     out.push_str("}\n");
+    out
+}
+
+/// Wells of sodium carbonate, each titrated by a pipette until acid is in excess.
+fn wells(count: usize) -> String {
+    let mut out = String::from(
+        "mtx 1\nuse std::equilibria\nuse std::opentrons::{Corning96, OT2, P20Single, Reservoir1, TipRack20, TrashBin}\n\nsolution acid { HCl: 0.1 mol/L, water: rest }\nsolution soda { Na2CO3: 0.08 mol/L, water: rest }\n\nlab deck {\n    ambient: 25 degC\n    ot2 = OT2 { left: P20Single } at (0, 0, 0) m\n",
+    );
+    out.push_str("    tips = TipRack20 on ot2.slot[1]\n    stock = Reservoir1 on ot2.slot[2] holding { A1: 150 mL of acid }\n    plate = Corning96 on ot2.slot[3] holding { A1 .. H12: 100 uL of soda }\n}\n\n");
+    out.push_str("workflow titrate in deck {\n    pick up tip from tips by ot2.left\n");
+    for i in 0..count {
+        let well = format!("plate[{}{}]", char::from(b'A' + (i % 8) as u8), i / 8 + 1);
+        let _ = writeln!(
+            out,
+            "    repeat 12 times {{ aspirate 20 uL from stock[A1] by ot2.left, dispense 20 uL into {well} by ot2.left }}"
+        );
+        let _ = writeln!(out, "    expect acidity({well}.contents) in 1 .. 4");
+    }
+    out.push_str("    drop tip by ot2.left\n}\n");
     out
 }
 

@@ -821,7 +821,7 @@ fn species(s: &crate::declare::species::SpeciesDef<'_>) -> matterix_ir::model::S
         name: s.name.clone(),
         formula: s.formula.as_ref().map(ToString::to_string).unwrap_or_default(),
         elements: s.formula.iter().flat_map(|f| f.elements.iter().map(|(e, n)| (e.to_string(), n.to_f64()))).collect(),
-        charge: s.formula.as_ref().map_or(0, |f| f.charge),
+        charge: s.charge(),
         molar_mass: s.molar_mass,
         by_mass: s.by_mass,
         span: s.span,

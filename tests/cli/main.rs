@@ -33,6 +33,7 @@ mod hollow;
 mod interactions;
 mod joints;
 mod laws;
+mod layers;
 mod lsp;
 mod matter;
 mod mcp;

@@ -12,7 +12,14 @@ use crate::ast::{Field, ItemKind};
 use crate::names::{Decl, Names, item_name};
 
 /// The fields of which each gives the constant of an equilibrium.
-pub const CONSTANTS: &[&str] = &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC];
+pub const CONSTANTS: &[&str] =
+    &["constant", "log_constant", "pka", "ksp", "pksp", PARTITION, LOG_PARTITION, POTENTIAL, ANALYTIC];
+
+/// The field that gives the ratio of a concentration in another liquid to that in water.
+pub const PARTITION: &str = "partition";
+
+/// The field that gives log10 of that.
+pub const LOG_PARTITION: &str = "log_p";
 
 /// The field that gives the standard potential of a half-cell.
 pub const POTENTIAL: &str = "potential";
@@ -23,8 +30,7 @@ pub const HEAT: &str = "heat";
 /// The field that gives the constant at every temperature.
 pub const ANALYTIC: &str = "analytic";
 
-const FIELDS: &[&str] =
-    &["constant", "log_constant", "pka", "ksp", "pksp", POTENTIAL, ANALYTIC, "at", "enthalpy", HEAT, "valid", "source"];
+const FIELDS: &[&str] = &["at", "enthalpy", HEAT, "valid", "source"];
 
 /// An equilibrium whose species are all known.
 #[derive(Clone, Debug)]
@@ -76,7 +82,8 @@ pub fn collect<'a>(
     let is_replaced = |decl: &&Decl<'a>| is_library(decl) && name_of(decl).is_some_and(|name| own.contains(&name));
     for decl in all().filter(|decl| !is_replaced(decl)) {
         let ItemKind::Equilibrium { name, reactants, products, fields } = &decl.item.kind else { continue };
-        unknown_fields(fields, FIELDS, "an equilibrium", diagnostics);
+        let known: Vec<&str> = CONSTANTS.iter().chain(FIELDS).copied().collect();
+        unknown_fields(fields, &known, "an equilibrium", diagnostics);
         let Some((left, right)) = species.sides(names, decl.module, (reactants, products), diagnostics) else {
             continue;
         };
@@ -122,7 +129,7 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
                 "the position of this equilibrium is unknown",
             )
             .help(
-                "add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10`, `pksp: 9.75`, or `potential: 0.77 V` for a half-cell",
+                "add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10`, `pksp: 9.75`, `partition: 85` for a second liquid, or `potential: 0.77 V` for a half-cell",
             ),
         ),
         (Some(first), Some(second)) => diagnostics.push(
@@ -183,6 +190,20 @@ fn check_form(
             diagnostics.push(d.help("write it as a reduction, with `e-` on the left"));
         }
     }
+    if let Some(f) = field(fields, PARTITION).or_else(|| field(fields, LOG_PARTITION)) {
+        let is_in = |side: &[(SpeciesId, f64)], apart: bool| match dry_terms(species, side)[..] {
+            [(s, n)] => n == 1.0 && species.get(s).liquid.is_some() == apart,
+            _ => false,
+        };
+        if !is_in(left, false) || !is_in(right, true) {
+            let headline =
+                "a partition constant is that of one species between water and another liquid: `I2 <-> I2_org`";
+            let label = "not from water to one species that is `dissolved_in` another liquid";
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, label);
+            let d = d.because(f.key.span, "the partition constant stands here");
+            diagnostics.push(d.help("declare the other form, `species I2_org { formula: \"I2\", dissolved_in: CHCl3 }`, or give `log_constant` for another equation"));
+        }
+    }
     let is_one_solid =
         dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || (*n == 1.0 && !species.get(*s).is_gas));
     if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")).filter(|_| !is_one_solid) {
@@ -190,6 +211,11 @@ fn check_form(
         let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
         diagnostics.push(d.because(f.key.span, "the solubility product is here"));
     }
+}
+
+/// A side of an equation without water.
+fn dry_terms(species: &SpeciesTable<'_>, side: &[(SpeciesId, f64)]) -> Vec<(SpeciesId, f64)> {
+    side.iter().copied().filter(|(s, _)| !species.get(*s).is_water).collect()
 }
 
 /// The gas of an equation and what it dissolves as, `CO2(g) <-> CO2`; an error where a gas stands in an equation of another form, or where
@@ -209,9 +235,7 @@ fn gas_form(
             d.help("write the gas and its dissolved form only, and later reactions on their own: `CO2(g) <-> CO2`"),
         )
     };
-    let dry = |side: &'_ [(SpeciesId, f64)]| -> Vec<(SpeciesId, f64)> {
-        side.iter().copied().filter(|(s, _)| !species.get(*s).is_water).collect()
-    };
+    let dry = |side: &'_ [(SpeciesId, f64)]| dry_terms(species, side);
     let headline = format!("the equilibrium of the gas `{name}` must give its solubility");
     let [(dissolved, one)] = dry(right)[..] else {
         return Err(wrong(headline, "its right side is not one dissolved species"));
@@ -223,8 +247,7 @@ fn gas_form(
         return Err(wrong(headline, "both coefficients must be 1"));
     }
     let def = species.get(dissolved);
-    let is_charged = def.formula.as_ref().is_some_and(|f| f.charge != 0);
-    if def.is_gas || def.is_electron || is_charged || !def.dissolves.is_empty() || def.name.ends_with("(s)") {
+    if !def.is_aqueous() || def.charge() != 0 {
         return Err(wrong(headline, &format!("`{}` is not a neutral dissolved species", def.name)));
     }
     match before.iter().find(|e| e.gas.is_some_and(|(other, _)| other == gas)) {

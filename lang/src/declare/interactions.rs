@@ -90,11 +90,7 @@ pub fn collect<'a>(
         let refused = |headline: String, label: &str, help: &str| {
             Diagnostic::error(codes::INTERACTION_FORM, span, headline, label).help(help)
         };
-        let is_dissolved = |s: SpeciesId| {
-            let def = species.get(s);
-            !def.is_water && !def.is_electron && !def.name.ends_with("(s)") && def.dissolves.is_empty()
-        };
-        if let Some((s, _)) = members.iter().find(|(s, n)| *n != 1.0 || !is_dissolved(*s)) {
+        if let Some((s, _)) = members.iter().find(|(s, n)| *n != 1.0 || !species.get(*s).is_aqueous()) {
             let headline = format!("`{}` must be between dissolved species", name.text);
             let label = format!("`{}` is not dissolved", species.get(*s).name);
             diagnostics.push(refused(
@@ -104,7 +100,7 @@ pub fn collect<'a>(
             ));
             continue;
         }
-        let charge = |s: &SpeciesId| species.get(*s).formula.as_ref().map_or(0, |f| f.charge);
+        let charge = |s: &SpeciesId| species.get(*s).charge();
         let members: Vec<SpeciesId> = members.into_iter().map(|(s, _)| s).collect();
         let charges: Vec<i32> = members.iter().map(charge).collect();
         let has_twice = (1..members.len()).any(|k| members[..k].contains(&members[k]));

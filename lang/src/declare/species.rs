@@ -38,11 +38,24 @@ pub struct SpeciesDef<'a> {
     pub fields: &'a [Field],
     /// What it splits into in water, with counts.
     pub dissolves: Vec<(SpeciesId, f64)>,
+    /// The liquid beside water that it is dissolved in, if it is not in water.
+    pub liquid: Option<SpeciesId>,
     /// Where its name stands.
     pub span: Span,
 }
 
 impl SpeciesDef<'_> {
+    /// Elementary charges; none where its composition is not known.
+    pub fn charge(&self) -> i32 {
+        self.formula.as_ref().map_or(0, |formula| formula.charge)
+    }
+
+    /// Whether it can be dissolved in water as it stands: no gas, no solid, nothing that splits or is in another liquid.
+    pub fn is_aqueous(&self) -> bool {
+        let is_elsewhere = self.is_water || self.is_electron || self.is_gas || self.liquid.is_some();
+        !is_elsewhere && self.dissolves.is_empty() && !self.name.ends_with("(s)")
+    }
+
     /// The phase it states: `solid`, `liquid`, `gas`.
     pub fn phase(&self) -> Option<&str> {
         match &field(self.fields, "phase")?.value {
@@ -67,6 +80,9 @@ pub struct SpeciesTable<'a> {
 
 /// Fields of a species that say what it is; all others are properties.
 const FIELDS: &[&str] = &["smiles", "formula", "same_as", "dissolves", "by", "reactive_groups"];
+
+/// The property of a species that says which liquid beside water holds it.
+const DISSOLVED_IN: &str = "dissolved_in";
 
 /// The species of the left and of the right side of an equation, with their counts.
 pub type Sides = (Vec<(SpeciesId, f64)>, Vec<(SpeciesId, f64)>);
@@ -118,7 +134,33 @@ impl<'a> SpeciesTable<'a> {
             }
             table.all[index].dissolves = ions;
         }
+        for index in 0..table.all.len() {
+            table.all[index].liquid = table.liquid_of(index, names, diagnostics);
+        }
         table
+    }
+
+    /// The liquid that a species says it is dissolved in; what cannot be is reported.
+    fn liquid_of(&self, index: usize, names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<SpeciesId> {
+        let def = &self.all[index];
+        let given = field(def.fields, DISSOLVED_IN)?;
+        let FieldValue::Expr(Expr { kind, span, .. }) = &given.value else { return None };
+        let ExprKind::Name(name) = &**kind else { return None };
+        let found = self.lookup(names, def.module, name).map_err(|d| diagnostics.push(*d)).ok()?;
+        let liquid = self.get(found);
+        let is_liquid = found.0 as usize != index && field(liquid.fields, DISSOLVED_IN).is_none();
+        let wrong = match () {
+            () if liquid.is_water => "what is dissolved in water needs no `dissolved_in`",
+            () if !is_liquid || liquid.charge() != 0 || liquid.is_gas => "not a liquid",
+            () if def.charge() != 0 || !def.dissolves.is_empty() => "ions stay in water",
+            () => return Some(found),
+        };
+        let headline = format!("`{}` cannot be dissolved in `{}`", def.name, liquid.name);
+        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, *span, headline, wrong);
+        diagnostics.push(d.help(
+            "name the liquid that does not mix with water: `species I2_org { formula: \"I2\", dissolved_in: CHCl3 }`",
+        ));
+        None
     }
 
     /// Species of equation terms with their counts; unknown ones are reported and left out.
@@ -292,6 +334,7 @@ fn species<'a>(
         by_mass,
         fields,
         dissolves: Vec::new(),
+        liquid: None,
         span: name.span,
     }
 }
@@ -364,7 +407,9 @@ fn check_forms(fields: &[Field], diagnostics: &mut Vec<Diagnostic>) {
         let (fits, form) = match f.key.text.as_str() {
             "formula" | "smiles" => (matches!(kind, Some(ExprKind::Text(_) | ExprKind::Error)), "a text in quotes"),
             "by" => (matches!(kind, Some(ExprKind::Name(n)) if n.text == "mass"), "`mass`"),
-            "same_as" => (matches!(kind, Some(ExprKind::Name(_) | ExprKind::Error)), "the name of a species"),
+            "same_as" | DISSOLVED_IN => {
+                (matches!(kind, Some(ExprKind::Name(_) | ExprKind::Error)), "the name of a species")
+            }
             "dissolves" => (matches!(f.value, FieldValue::Species(_)), "a sum of ions, such as `Na+ + Cl-`"),
             _ => continue,
         };

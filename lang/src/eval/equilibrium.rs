@@ -12,7 +12,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
-use crate::declare::equilibria::{ANALYTIC, CONSTANTS, HEAT, POTENTIAL};
+use crate::declare::equilibria::{ANALYTIC, CONSTANTS, HEAT, LOG_PARTITION, PARTITION, POTENTIAL};
 use crate::declare::species::field;
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::interactions::Acting;
@@ -129,7 +129,11 @@ impl<'a> Elaborator<'a> {
         let equilibria: Vec<usize> = (0..self.tables.equilibria.len())
             .filter(|e| {
                 let def = &self.tables.equilibria[*e];
-                def.gas.is_none() && def.terms.iter().all(|(s, _)| here.contains_key(s) || self.is_formal(*s))
+                let is_here = |s: &SpeciesId| {
+                    let liquid = self.tables.species.get(*s).liquid;
+                    here.contains_key(s) && liquid.is_none_or(|liquid| here.contains_key(&liquid))
+                };
+                def.gas.is_none() && def.terms.iter().all(|(s, _)| is_here(s) || self.is_formal(*s))
             })
             .collect();
         let water = here.keys().copied().find(|s| self.tables.species.get(*s).is_water)?;
@@ -154,7 +158,7 @@ impl<'a> Elaborator<'a> {
         }
         let acting = match self.spread_of_interactions(id) {
             Some(spread) => {
-                let charge = |s: &SpeciesId| self.tables.species.get(*s).formula.as_ref().map_or(0, |f| f.charge);
+                let charge = |s: &SpeciesId| self.tables.species.get(*s).charge();
                 let acts = |s: &SpeciesId| {
                     let mut interactions = self.tables.interactions.iter();
                     interactions.any(|i| i.members.contains(s) && i.members.iter().all(|m| here.contains_key(m)))
@@ -210,10 +214,10 @@ impl<'a> Elaborator<'a> {
                 (true, _) => Phase::Solvent,
                 (_, true) => Phase::Solid,
                 _ if def.is_electron => Phase::Formal,
+                _ if def.liquid.is_some() => Phase::Extracted,
                 _ => Phase::Solute,
             };
-            let charge = def.formula.as_ref().map_or(0.0, |f| f64::from(f.charge));
-            Member { name: def.name.clone(), phase, charge }
+            Member { name: def.name.clone(), phase, charge: f64::from(def.charge()) }
         };
         let equation = |e: &usize| {
             let def = &tables.equilibria[*e];
@@ -250,13 +254,18 @@ impl<'a> Elaborator<'a> {
         let property = self.capacity_property(id);
         for (i, s) in members.iter().enumerate() {
             args[layout.amount(i)] = self.held(id, *s, split);
-            if let Some(capacity) = property.as_ref().and_then(|p| self.capacity_of(*s, p)) {
+            if let Some(capacity) = property.as_ref().and_then(|p| self.number_of(*s, p)) {
                 args[layout.capacity_of(i)] = capacity;
             }
             if let Some(law) = law {
                 let at = layout.coefficients(i);
                 args[at..at + Layout::COEFFICIENTS].copy_from_slice(&self.coefficients_of(id, *s, law)?);
             }
+        }
+        let liquids = members.iter().filter_map(|s| self.tables.species.get(*s).liquid);
+        for (k, liquid) in liquids.collect::<Vec<_>>().into_iter().enumerate() {
+            let amount = self.held(id, liquid, split);
+            args[layout.liquid(k)] = self.multiple(self.tables.species.get(liquid).molar_mass, amount);
         }
         let ions = self.bystanders(id, members);
         args[layout.bystanders()] = self.weighed(id, &ions, split, |charge| 0.5 * charge * charge);
@@ -312,7 +321,7 @@ impl<'a> Elaborator<'a> {
 
     /// The ions that are in no equilibrium, with their charges.
     fn bystanders(&self, id: InstanceId, members: &[SpeciesId]) -> Vec<(SpeciesId, f64)> {
-        let charge = |s: SpeciesId| self.tables.species.get(s).formula.as_ref().map_or(0, |f| f.charge);
+        let charge = |s: SpeciesId| self.tables.species.get(s).charge();
         let others = self.amounts_in(id).filter(|(s, _)| !members.contains(s));
         others.map(|(s, _)| (s, f64::from(charge(s)))).filter(|(_, charge)| *charge != 0.0).collect()
     }
@@ -385,7 +394,7 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    fn capacity_of(&mut self, s: SpeciesId, property: &str) -> Option<NodeId> {
+    fn number_of(&mut self, s: SpeciesId, property: &str) -> Option<NodeId> {
         let name = crate::ast::Name { text: property.to_owned(), span: self.tables.species.get(s).span };
         match self.member(Value::Species(s), &name) {
             Value::Num(n) => Some(n.node),
@@ -419,6 +428,15 @@ impl<'a> Elaborator<'a> {
                 node
             }
             "log_constant" => self.multiple(LN_10, n.node),
+            PARTITION | LOG_PARTITION => {
+                let ln = match key {
+                    PARTITION => self.graph.unary(UnaryOp::Ln, n.node),
+                    _ => self.multiple(LN_10, n.node),
+                };
+                self.note_place(ln, given.span);
+                let shift = self.per_kilogram(e, given.span)?;
+                self.graph.binary(BinaryOp::Add, ln, shift)
+            }
             _ => self.multiple(-LN_10, n.node),
         };
         let mut terms = [self.graph.number(0.0); Layout::TERMS];
@@ -434,6 +452,32 @@ impl<'a> Elaborator<'a> {
         terms[0] = self.graph.binary(BinaryOp::Add, ln_k, shift);
         terms[1] = self.multiple(-1.0 / GAS, enthalpy);
         Some(Constant { terms, enthalpy })
+    }
+
+    /// What turns the logarithm of a ratio of concentrations in two liquids into that of molalities: that of the density of water over the
+    /// other one's.
+    fn per_kilogram(&mut self, e: usize, at: Span) -> Option<NodeId> {
+        let species = self.tables.equilibria[e].terms.iter().map(|(s, _)| *s);
+        let liquid = species.filter_map(|s| self.tables.species.get(s).liquid).next()?;
+        let water = self.tables.species.iter().map(|(s, _)| s).find(|s| self.tables.species.get(*s).is_water)?;
+        let mut logarithms = [water, liquid].into_iter().map(|s| {
+            let name = self.tables.species.get(s).name.clone();
+            let Some(density) = self.number_of(s, "density") else {
+                let headline = format!("the density of `{name}` is not known");
+                let d = Diagnostic::error(
+                    codes::MISSING_FIELD,
+                    at,
+                    headline,
+                    "a partition constant compares concentrations",
+                );
+                self.report(d.help("give the density of the liquid, or the ratio of molalities as `constant`"));
+                return None;
+            };
+            Some(self.graph.unary(UnaryOp::Ln, density))
+        });
+        let (of_water, of_liquid) = (logarithms.next()??, logarithms.next()??);
+        drop(logarithms);
+        Some(self.graph.binary(BinaryOp::Sub, of_water, of_liquid))
     }
 
     /// `log10 K = A1 + A2 T + A3 / T + A4 log10 T + A5 / T^2 + A6 T^2`, with the temperature T in K; those that are left out are 0.

@@ -798,7 +798,7 @@ impl<'a> Elaborator<'a> {
                 return self.num(node, dimension);
             }
             "charge" => {
-                let charge = def.formula.as_ref().map_or(0, |f| f.charge);
+                let charge = def.charge();
                 return self.number(f64::from(charge), Dimension::one(), false);
             }
             "splits" => {

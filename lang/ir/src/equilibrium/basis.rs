@@ -75,8 +75,10 @@ pub(super) struct Basis {
     pub(super) by: Vec<Vec<(usize, f64)>>,
     /// The solvent, by member.
     pub(super) water: usize,
-    /// Dissolved members.
+    /// Dissolved members, in whichever liquid.
     pub(super) solutes: Vec<usize>,
+    /// Those in another liquid than the solvent.
+    pub(super) extracted: Vec<usize>,
     /// Solids.
     pub(super) solids: Vec<usize>,
     /// Formal members.
@@ -121,7 +123,7 @@ impl Basis {
         let water = water.ok_or_else(|| Unsettled("no solvent is present".into()))?;
         let (rows, circles) = reduced(written)?;
         let formed: Vec<usize> = rows.iter().map(|(pivot, _)| *pivot).collect();
-        let is_dissolved = |i: usize| matches!(phase(i), Phase::Solute | Phase::Formal);
+        let is_dissolved = |i: usize| phase(i).is_dissolved() || phase(i) == Phase::Formal;
         let is_master = |i: &usize| is_dissolved(*i) && !formed.contains(i);
         let masters: Vec<usize> = (0..count).filter(is_master).collect();
         let mut of = vec![vec![0.0; masters.len()]; count];
@@ -133,8 +135,9 @@ impl Basis {
             solvent[pivot] = -row.members[water];
             by[pivot] = row.equations.into_iter().enumerate().filter(|(_, by)| by.abs() > NOTHING).collect();
         }
-        let with = |wanted: Phase| (0..count).filter(|i| phase(*i) == wanted).collect();
-        let (solutes, solids, formal) = (with(Phase::Solute), with(Phase::Solid), with(Phase::Formal));
+        let with = |wanted: Phase| -> Vec<usize> { (0..count).filter(|i| phase(*i) == wanted).collect() };
+        let (solids, formal, extracted) = (with(Phase::Solid), with(Phase::Formal), with(Phase::Extracted));
+        let solutes = (0..count).filter(|i| phase(*i).is_dissolved()).collect();
         let (held, of_held) = (Vec::new(), vec![Vec::new(); count]);
         let charges = written.members.iter().map(|m| m.charge).collect();
         let basis = Basis {
@@ -144,6 +147,7 @@ impl Basis {
             by,
             water,
             solutes,
+            extracted,
             solids,
             formal,
             held,
@@ -261,10 +265,10 @@ fn reduced(written: &Written) -> Result<Reduced, Unsettled> {
 /// which stands alone on its side, so that totals of the rest count up.
 fn pivot(written: &Written, row: &Row) -> Option<usize> {
     let phase = |i: usize| written.members[i].phase;
-    let is_matter = |i: usize| matches!(phase(i), Phase::Solute | Phase::Solid);
+    let is_matter = |i: usize| phase(i).is_dissolved() || phase(i) == Phase::Solid;
     let is_there = |i: &usize| row.members[*i] != 0.0 && is_matter(*i);
     let beside = |i: usize| {
-        let same = |j: &usize| is_there(j) && phase(*j) == Phase::Solute && row.members[*j] * row.members[i] > 0.0;
+        let same = |j: &usize| is_there(j) && phase(*j).is_dissolved() && row.members[*j] * row.members[i] > 0.0;
         (0..row.members.len()).filter(same).count()
     };
     let named = |i: usize| written.equations.iter().filter(|e| e.coefficients[i] != 0.0).count();

@@ -46,10 +46,20 @@ pub enum Phase {
     Solvent,
     /// Dissolved: its activity is its molality times a coefficient.
     Solute,
+    /// Dissolved in another liquid, which stands beside the solvent and which no equation changes: its activity is its amount per mass of
+    /// that. It has no charge.
+    Extracted,
     /// A pure solid: its activity is 1 where there is some of it.
     Solid,
     /// A formal one, as the electron of half-cells is: it has an activity, but there is never any of it.
     Formal,
+}
+
+impl Phase {
+    /// Whether a member is in a liquid, whichever.
+    pub(crate) fn is_dissolved(self) -> bool {
+        matches!(self, Phase::Solute | Phase::Extracted)
+    }
 }
 
 /// One of the species of a system.
@@ -137,8 +147,8 @@ pub enum Part {
     Capacity,
 }
 
-/// Arguments of a system, in their order: what is the same for all, then what is of an equation, of an interaction, of a member, then the
-/// heat.
+/// Arguments of a system, in their order: what is the same for all, then what is of an equation, of an interaction, of a member, then
+/// other liquids and the heat.
 ///
 /// The constant of an equation follows from six terms, as a number of an interaction does, with the temperature T in K:
 /// `ln K = k0 + k1 / T + k2 ln T + k3 T + k4 / T^2 + k5 T^2`. The equation of energy is
@@ -149,6 +159,8 @@ pub struct Layout {
     equations: usize,
     /// Numbers of [`Interactions`].
     interactions: usize,
+    /// Members in other liquids.
+    extracted: usize,
 }
 
 impl Layout {
@@ -196,9 +208,14 @@ impl Layout {
         self.capacity_of(self.members) + member
     }
 
+    /// The mass of the liquid that a member is in, counted among [`Phase::Extracted`] ones, kg.
+    pub fn liquid(self, extracted: usize) -> usize {
+        self.amount(self.members) + extracted
+    }
+
     /// Half the sum of amount times charge squared over the ions that take part in no equation, mol.
     pub fn bystanders(self) -> usize {
-        self.amount(self.members)
+        self.liquid(self.extracted)
     }
 
     /// The amount of these, mol.
@@ -239,8 +256,10 @@ impl Layout {
             Role::Coefficient(member, number)
         } else if arg < self.amount(0) {
             Role::CapacityOf(arg - self.capacity_of(0))
-        } else if arg < self.bystanders() {
+        } else if arg < self.liquid(0) {
             Role::Amount(arg - self.amount(0))
+        } else if arg < self.bystanders() {
+            Role::Liquid(arg - self.liquid(0))
         } else {
             let last = [Role::Bystanders, Role::BystanderAmount, Role::Heat, Role::Capacity, Role::Reference];
             last[arg - self.bystanders()]
@@ -258,6 +277,7 @@ enum Role {
     Coefficient(usize, usize),
     CapacityOf(usize),
     Amount(usize),
+    Liquid(usize),
     Bystanders,
     BystanderAmount,
     Heat,
@@ -279,7 +299,8 @@ impl System {
     /// Where each argument stands.
     pub fn layout(&self) -> Layout {
         let interactions = self.virial.as_ref().map_or(0, |virial| virial.count());
-        Layout { members: self.written.members.len(), equations: self.written.equations.len(), interactions }
+        let extracted = self.basis.extracted.len();
+        Layout { members: self.written.members.len(), equations: self.written.equations.len(), interactions, extracted }
     }
 
     /// Equations that follow from others, by what each is made of: their constants must agree.

@@ -9,7 +9,8 @@ use super::state::NO_IONS;
 use super::{Layout, System};
 use crate::math;
 
-/// A total below this, in mol per kg of solvent, counts as none: its members are followed linearly from there to nothing and below.
+/// A total below this, in mol per kg of solvent, counts as none: its members are followed linearly from there to nothing and below. So
+/// does a mass of another liquid, in kg.
 pub(super) const TRACE: f64 = 1e-30;
 
 /// The logarithm of an activity of which nothing is known.
@@ -103,6 +104,12 @@ impl<'a> Problem<'a> {
     /// What is beside the members; an integrator may try less than none of it.
     pub(super) fn beside(&self, arg: usize) -> f64 {
         self.args[arg].max(0.0)
+    }
+
+    /// The mass of the liquid that a member is in beside the solvent, kg; none of one in the solvent.
+    pub(super) fn liquid(&self, member: usize) -> Option<f64> {
+        let place = self.basis.extracted.iter().position(|i| *i == member)?;
+        Some(self.args[self.layout.liquid(place)].max(TRACE))
     }
 
     pub(super) fn given(&self, member: usize) -> f64 {

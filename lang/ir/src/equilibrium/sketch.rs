@@ -45,6 +45,7 @@ impl Sketch {
         let phase = match name {
             "e-" => Phase::Formal,
             name if name.ends_with("(s)") => Phase::Solid,
+            name if name.ends_with("(org)") => Phase::Extracted,
             _ => Phase::Solute,
         };
         let signs = |sign: char| name.chars().rev().take_while(|c| *c == sign).count() as f64;

@@ -106,6 +106,12 @@ fn beside(problem: &Problem<'_>, point: &Point, arg: usize) -> (Vec<f64>, Vec<f6
             let charge = problem.system.members()[i].charge;
             if i == member { problem.coefficients(i).by_own(&around, charge, which) } else { 0.0 }
         }),
+        (Role::Liquid(place), _) if problem.args[arg] >= 0.0 => {
+            let mut grown = vec![0.0; count];
+            let member = basis.extracted[place];
+            grown[member] = problem.liquid(member).map_or(0.0, |mass| 1.0 / mass);
+            (grown, vec![0.0; count])
+        }
         (Role::Constant(r, term), _) => {
             let by = terms(temperature)[term];
             same((0..count).map(|i| by * by_equation(basis, i, r)).collect())
@@ -170,7 +176,7 @@ fn aside(problem: &Problem<'_>, point: &Point, arg: usize, rows: &mut [f64]) {
             let all = 0..basis.of.len();
             rows[warmth] -= all.map(|i| by_equation(basis, i, r) * formed(i)).sum::<f64>() / scale;
         }
-        Role::Activities(_) | Role::Constant(..) | Role::Coefficient(..) | Role::Interaction(..) => {}
+        Role::Activities(_) | Role::Constant(..) | Role::Coefficient(..) | Role::Interaction(..) | Role::Liquid(_) => {}
     }
 }
 
@@ -179,9 +185,9 @@ fn slope(problem: &Problem<'_>, point: &Point, direction: &Direction, part: Part
     let (basis, layout, places) = (&problem.basis, problem.layout, problem.places());
     let role = layout.role(arg);
     let dissolved = |i: usize| {
-        let beside = match problem.system.members()[i].phase {
-            Phase::Solute => direction.grown[i] * point.state.amounts[i],
-            _ => 0.0,
+        let beside = match problem.system.members()[i].phase.is_dissolved() {
+            true => direction.grown[i] * point.state.amounts[i],
+            false => 0.0,
         };
         problem.growth(&direction.step, &point.state, i) + beside
     };

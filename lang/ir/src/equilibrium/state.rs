@@ -77,7 +77,12 @@ impl Problem<'_> {
                 Some(virial) => virial.place(i).map_or_else(Coefficient::default, |k| state.interacting(k)),
                 None => self.coefficients(i).coefficient(&around, charge),
             };
-            let amount = math::exp(self.activity(i, state, x) - coefficient.ln + x[places.solvent()]);
+            let activity = self.activity(i, state, x);
+            if let Some(mass) = self.liquid(i) {
+                state.amounts[i] = mass * math::exp(activity);
+                continue;
+            }
+            let amount = math::exp(activity - coefficient.ln + x[places.solvent()]);
             state.coefficients[i] = coefficient;
             state.amounts[i] = amount;
             charges += 0.5 * charge * charge * amount;
@@ -234,8 +239,11 @@ impl Problem<'_> {
 
     /// The same of the amount of a dissolved member.
     fn amount_by(&self, member: usize, state: &State) -> [f64; 4] {
-        let ([solvent, strength, molality, warmth], of) =
-            (self.activity_by(member, state), &state.coefficients[member]);
+        let (by, of) = (self.activity_by(member, state), &state.coefficients[member]);
+        if self.system.members()[member].phase == Phase::Extracted {
+            return by;
+        }
+        let [solvent, strength, molality, warmth] = by;
         [solvent + 1.0, strength - of.by_strength, molality, warmth - of.by_warmth]
     }
 
@@ -285,7 +293,8 @@ impl Problem<'_> {
         for (row, of) in self.basis.parts.row(member) {
             visit(*row, of * state.inverse[*row][usize::from(*of < 0.0)]);
         }
-        if member != self.basis.water && places.strength() < free {
+        let is_solute = self.system.members()[member].phase == Phase::Solute;
+        if is_solute && places.strength() < free {
             let charge = self.basis.charges[member];
             if charge != 0.0 {
                 visit(places.strength(), -0.5 * charge * charge * state.by_charges);
@@ -308,7 +317,7 @@ impl Problem<'_> {
         match self.system.members()[member].phase {
             Phase::Solvent => amount * step[places.solvent()],
             Phase::Solid | Phase::Formal => 0.0,
-            Phase::Solute => {
+            Phase::Solute | Phase::Extracted => {
                 amount * self.along(step, member, self.amount_by(member, state), &self.by_placed(member, state))
             }
         }
