@@ -197,10 +197,10 @@ fn check_form(
         };
         if !is_in(left, false) || !is_in(right, true) {
             let headline =
-                "a partition constant is that of one species between water and another liquid: `I2 <-> I2_org`";
-            let label = "not from water to one species that is `dissolved_in` another liquid";
+                "`partition` needs the equation of one species between water and another liquid: `I2 <-> I2_org`";
+            let label = "the right side is not one species `dissolved_in` another liquid";
             let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, label);
-            let d = d.because(f.key.span, "the partition constant stands here");
+            let d = d.because(f.key.span, "the partition constant is here");
             diagnostics.push(d.help("declare the other form, `species I2_org { formula: \"I2\", dissolved_in: CHCl3 }`, or give `log_constant` for another equation"));
         }
     }

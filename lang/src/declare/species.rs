@@ -150,7 +150,7 @@ impl<'a> SpeciesTable<'a> {
         let liquid = self.get(found);
         let is_liquid = found.0 as usize != index && field(liquid.fields, DISSOLVED_IN).is_none();
         let wrong = match () {
-            () if liquid.is_water => "what is dissolved in water needs no `dissolved_in`",
+            () if liquid.is_water => "a species in water needs no `dissolved_in`",
             () if !is_liquid || liquid.charge() != 0 || liquid.is_gas => "not a liquid",
             () if def.charge() != 0 || !def.dissolves.is_empty() => "ions stay in water",
             () => return Some(found),

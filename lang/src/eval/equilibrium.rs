@@ -463,12 +463,12 @@ impl<'a> Elaborator<'a> {
         let mut logarithms = [water, liquid].into_iter().map(|s| {
             let name = self.tables.species.get(s).name.clone();
             let Some(density) = self.number_of(s, "density") else {
-                let headline = format!("the density of `{name}` is not known");
+                let headline = format!("the density of `{name}` is unknown");
                 let d = Diagnostic::error(
                     codes::MISSING_FIELD,
                     at,
                     headline,
-                    "a partition constant compares concentrations",
+                    "a partition constant is a ratio of concentrations",
                 );
                 self.report(d.help("give the density of the liquid, or the ratio of molalities as `constant`"));
                 return None;
