@@ -17,7 +17,9 @@ use crate::report::points::Place;
 /// Checks, runs and explains robotic chemistry protocols written in .mtx.
 #[derive(Debug, Parser)]
 #[command(name = "matterixc", version, subcommand_required = true, arg_required_else_help = true)]
-#[command(after_help = "Exit status: 0 nothing wrong; 1 findings, a failed run or expectation; 2 usage or files.")]
+#[command(
+    after_help = "Exit status: 0 success; 1 findings, a failed run or a failed expectation; 2 wrong usage or unreadable files."
+)]
 pub struct Cli {
     /// When to use colours.
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
@@ -32,64 +34,64 @@ pub struct Cli {
 pub enum Color {
     /// On a terminal, unless NO_COLOR is set.
     Auto,
-    /// In every case.
+    /// Always.
     Always,
-    /// In no case.
+    /// Never.
     Never,
 }
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Report what is wrong with files, without running them.
+    /// Find faults in files without running them.
     Check(CheckArgs),
-    /// Rewrite files in the one style.
+    /// Format files.
     Fmt(FmtArgs),
     /// Run a workflow on the digital twin and judge its expectations.
     Run(RunArgs),
     /// Run the tests of files and judge their expectations.
     Test(TestArgs),
-    /// Say what a run uses up and occupies: reagents, tips, vessels, waste, device time.
+    /// List the materials that a run consumes and occupies: reagents, tips, vessels, waste, device time.
     Bill(BillArgs),
-    /// Run a workflow many times, with what a study varies, and report what becomes of it.
+    /// Run a workflow many times with the variations of a study, and report the results.
     Study(StudyArgs),
     /// Estimate parameters of a workflow's model from data.
     Fit(FitArgs),
     /// Write a workflow as a protocol that a person can follow by hand.
     Doc(DocArgs),
-    /// Schedule a workflow: who has which instance when, so that the whole ends early.
+    /// Schedule a workflow: which step uses which instance when, so that it ends early.
     Plan(PlanArgs),
-    /// Carry a workflow out on devices, or say what would be sent to them.
+    /// Carry out a workflow on devices, or print the messages that would be sent.
     Deploy(DeployArgs),
-    /// Stand in for a device: answer on a line as it would.
+    /// Emulate a device: answer on a line like the device.
     Emulate(EmulateArgs),
-    /// Offer the devices of a lab to others, as features of SiLA 2: on the digital twin, or with `--bind` on devices.
+    /// Serve the devices of a lab as SiLA 2 features: on the digital twin, or with `--bind` on devices.
     #[cfg(feature = "sila")]
     Serve(ServeArgs),
-    /// List the servers of SiLA 2 on the network.
+    /// List the SiLA 2 servers on the network.
     #[cfg(feature = "sila")]
     Discover(DiscoverArgs),
-    /// Write a workflow as a file that another program runs.
+    /// Export a workflow as a file that another program runs.
     Emit(EmitArgs),
-    /// Write a file of another program as a module of the language.
+    /// Import a file of another program as a module of the language.
     Import(ImportArgs),
-    /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
+    /// Judge the robot motions of a recording: limits, kinematics, contacts of their true shapes, grips.
     Verify(VerifyArgs),
-    /// Show a lab, or play a recording, on a page in three dimensions.
+    /// Show a lab, or play a recording, on a 3D page.
     View(ViewArgs),
-    /// Answer an editor: a language server on standard input and output.
+    /// Run a language server on standard input and output, for editors.
     Lsp(LspArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
-    /// Say what the library knows of a substance, and where each number comes from.
+    /// Show the library's data of a substance, with the source of each number.
     Substance(SubstanceArgs),
     /// List the definitions of labware in the library, or print one.
     Labware(LabwareArgs),
-    /// Offer check, fix, run and the rest to an assistant, over the Model Context Protocol on standard input and output.
+    /// Serve check, fix, run and other tools to an assistant, over the Model Context Protocol on standard input and output.
     Mcp(McpArgs),
     /// Create a small project that checks, runs and passes.
     New(NewArgs),
-    /// Print what completes commands and options in a shell.
+    /// Print shell completions for commands and options.
     Completions(CompletionsArgs),
     /// Write pages for `man`: one for the command and one for each subcommand.
     Man(ManArgs),
@@ -100,14 +102,14 @@ pub enum Command {
 /// `matterixc completions`.
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
-    /// For which shell.
+    /// The shell.
     pub shell: clap_complete::Shell,
 }
 
 /// `matterixc man`.
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// The folder that they go to; it is made where it is not there.
+    /// The target folder; it is created if needed.
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
 }
@@ -121,25 +123,25 @@ pub struct CheckArgs {
     /// Form of the findings.
     #[arg(long, value_enum, default_value_t = Format::Human)]
     pub format: Format,
-    /// Take warnings for errors, and show advice as warnings.
+    /// Treat warnings as errors, and show advice as warnings.
     #[arg(long)]
     pub strict: bool,
-    /// How closely motions are looked at: with `process` not what is out of reach of robots and what they run into.
+    /// How motions are checked: `motion` also checks reach and collisions; `process` skips both.
     #[arg(long, value_enum, default_value_t = Fidelity::Motion)]
     pub fidelity: Fidelity,
-    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    /// Plan all motions again instead of using the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
-    /// Make the corrections that findings offer, those that leave no doubt; with `--fix=all` also what is probably meant.
+    /// Apply the safe fixes of findings; with `--fix=all` also the probable ones.
     #[arg(long, value_enum, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "sure")]
     pub fix: Option<Fixes>,
-    /// Look again whenever a file changes, until Ctrl-C.
+    /// Check again whenever a file changes, until Ctrl-C.
     #[arg(long, conflicts_with_all = ["fix", "at"])]
     pub watch: bool,
-    /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
+    /// Print the known state at every statement: contents of vessels, states of devices, elapsed time.
     #[arg(long)]
     pub contents: bool,
-    /// Say everything that is known after the statement at this place.
+    /// Print everything that is known after the statement at this place.
     #[arg(long, value_name = "LINE[:COLUMN]", requires = "contents")]
     pub at: Option<Place>,
 }
@@ -147,7 +149,7 @@ pub struct CheckArgs {
 /// `matterixc lsp`.
 #[derive(Debug, Args)]
 pub struct LspArgs {
-    /// Speak on standard input and output, as is done without it too: what some editors add.
+    /// Use standard input and output (the default); accepted because some editors pass it.
     #[arg(long)]
     pub stdio: bool,
 }
@@ -158,7 +160,7 @@ pub struct FmtArgs {
     /// The files; `-` reads standard input and writes standard output.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Write nothing; name the files that are not in the style, and fail if there are any.
+    /// Write nothing; list unformatted files, and fail if there are any.
     #[arg(long, conflicts_with = "stdout")]
     pub check: bool,
     /// Write to standard output, not to the files.
@@ -166,12 +168,12 @@ pub struct FmtArgs {
     pub stdout: bool,
 }
 
-/// A workflow of a file, with what it is given from outside.
+/// A workflow of a file, with its given parameters.
 #[derive(Debug, Args)]
 pub struct Subject {
     /// The file.
     pub file: PathBuf,
-    /// The workflow, where the file has several.
+    /// The workflow, if the file has several.
     #[arg(long, value_name = "NAME")]
     pub workflow: Option<String>,
     /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
@@ -195,28 +197,28 @@ pub struct RunArgs {
     /// What is compiled.
     #[command(flatten)]
     pub subject: Subject,
-    /// Where all randomness of the run starts.
+    /// The seed of the run.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Where to write recording, tables, plots and report; nothing is written without it.
+    /// The folder for recording, tables, plots and report; without it nothing is written.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write the tables as CSV too, one column a quantity.
+    /// Also write the tables as CSV, one column for each quantity.
     #[arg(long, requires = "out")]
     pub csv: bool,
-    /// How closely it is simulated.
+    /// The fidelity of the simulation.
     #[command(flatten)]
     pub reality: Reality,
-    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    /// Plan all motions again instead of using the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
-    /// Form of the report.
+    /// The format of the report.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,
-    /// Walk through the steps without simulating what they cause.
+    /// Go through the steps without simulating their effects.
     #[arg(long)]
     pub dry: bool,
-    /// Let claims take turns as in a schedule: one made before the run, or one that `plan --format json` has written.
+    /// Order claims by a schedule: one made before the run, or a file of `plan --format json`.
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     pub plan: Option<Option<PathBuf>>,
 }
@@ -224,16 +226,16 @@ pub struct RunArgs {
 /// How closely motions are simulated, and how the lab really is.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Reality {
-    /// How closely motions are simulated; with `motion` and `contact` they are looked at before the run begins.
+    /// How motions are simulated; `motion` and `contact` check them before the run.
     #[arg(long, value_enum, default_value_t = RunFidelity::Process)]
     pub fidelity: RunFidelity,
-    /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
+    /// Move freely standing things by a random distance up to this limit in each direction: `--perturb 20mm,10deg`.
     #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
     pub perturb: Option<Perturbation>,
-    /// Let the same things really be so far from where robots take them to be: `--unseen 2mm,1deg`, with `--fidelity motion` or `contact`.
+    /// Put things this far from the places that robots assume: `--unseen 2mm,1deg`, with `--fidelity motion` or `contact`.
     #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
     pub unseen: Option<Perturbation>,
-    /// Let friction and the force of grips really be such a share of what is said: `--really friction=0.2,grip=0.5`, with `--fidelity contact`.
+    /// Scale real friction and grip force against the declared values: `--really friction=0.2,grip=0.5`, with `--fidelity contact`.
     #[arg(long, value_name = "WHAT=SHARE[,..]", value_parser = really)]
     pub really: Option<Really>,
 }
@@ -244,16 +246,16 @@ pub struct PlanArgs {
     /// What is compiled.
     #[command(flatten)]
     pub subject: Subject,
-    /// Form of the schedule.
+    /// The format of the schedule.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,
-    /// Where to write a picture of it.
+    /// The file for a picture of it.
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// How long to look for a shorter schedule, by the clock.
+    /// How long to search for a shorter schedule, in wall-clock time.
     #[arg(long, value_name = "TIME", default_value = "30 s", value_parser = time)]
     pub time_limit: Duration,
-    /// Where all randomness of the search starts.
+    /// The seed of the search.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
 }
@@ -265,7 +267,7 @@ pub struct PlanArgs {
 pub enum Fidelity {
     /// Motions take their declared time.
     Process,
-    /// Robots move through space, around what stands there, in the time their joints need.
+    /// Robots move around obstacles, in the time that their joints need.
     Motion,
 }
 
@@ -276,7 +278,7 @@ pub enum Fidelity {
 pub enum RunFidelity {
     /// Motions take their declared time.
     Process,
-    /// Robots move through space, around what stands there, in the time their joints need.
+    /// Robots move around obstacles, in the time that their joints need.
     Motion,
     /// The same, and grips hold by force and friction: things slip, fall and topple.
     Contact,
@@ -294,19 +296,19 @@ pub enum RunFormat {
 /// `matterixc test`.
 #[derive(Debug, Args)]
 pub struct TestArgs {
-    /// Files, and folders that are searched for them.
+    /// Files, or folders to search for files.
     #[arg(default_value = ".", value_name = "FILE|DIR")]
     pub paths: Vec<PathBuf>,
-    /// Only tests whose name contains this.
+    /// Run only tests whose name contains this.
     #[arg(long, value_name = "TEXT")]
     pub only: Option<String>,
-    /// Where all randomness of each run starts.
+    /// The seed of each run.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// How closely they are simulated.
+    /// The fidelity of the simulation.
     #[command(flatten)]
     pub reality: Reality,
-    /// Form of the results.
+    /// The format of the results.
     #[arg(long, value_enum, default_value_t = TestFormat::Human)]
     pub format: TestFormat,
 }
@@ -314,7 +316,7 @@ pub struct TestArgs {
 /// Form of the results of tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TestFormat {
-    /// A line each, then the counts.
+    /// One line for each test, then the counts.
     Human,
     /// One JSON object per line.
     Json,
@@ -326,16 +328,16 @@ pub struct BillArgs {
     /// What is compiled.
     #[command(flatten)]
     pub subject: Subject,
-    /// For so many runs.
+    /// The number of runs.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     pub runs: u64,
-    /// Where all randomness of the run starts.
+    /// The seed of the run.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Prices, as a CSV table with the columns item,price,currency,quantity,unit.
     #[arg(long, value_name = "FILE")]
     pub prices: Option<PathBuf>,
-    /// Form of the bill.
+    /// The format of the bill.
     #[arg(long, value_enum, default_value_t = BillFormat::Human)]
     pub format: BillFormat,
 }
@@ -356,25 +358,25 @@ pub enum BillFormat {
 pub struct Many {
     /// The file.
     pub file: PathBuf,
-    /// Which study or fit, where the file has several.
+    /// The study or fit, if the file has several.
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// A parameter of the workflow that is not left open, as written in the language: `--set "target=40 degC"`.
+    /// A fixed parameter of the workflow, as written in the language: `--set "target=40 degC"`.
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     pub set: Vec<(String, String)>,
     /// The lab, for a workflow that runs in any.
     #[arg(long, value_name = "NAME")]
     pub lab: Option<String>,
-    /// Where all randomness starts.
+    /// The seed.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Where to write tables and figures; nothing is written without it.
+    /// The folder for tables and figures; without it nothing is written.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// On how many threads; on all processors without it. Results do not depend on it.
+    /// The number of threads; the default is all processors. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Form of the figures.
+    /// The format of the figures.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,
 }
@@ -397,7 +399,7 @@ pub struct StudyArgs {
     /// What is run.
     #[command(flatten)]
     pub many: Many,
-    /// How many runs, in place of what the study says.
+    /// The number of runs, instead of that in the study.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=matterix_ir::study::MOST_RUNS))]
     pub runs: Option<u64>,
 }
@@ -416,7 +418,7 @@ pub struct DocArgs {
     /// What is compiled.
     #[command(flatten)]
     pub subject: Subject,
-    /// Where to write it; to standard output without it.
+    /// The output file; without it, standard output.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -427,40 +429,40 @@ pub struct DeployArgs {
     /// What is compiled.
     #[command(flatten)]
     pub subject: Subject,
-    /// Where the devices of the lab are.
+    /// The bindings: where the devices of the lab are.
     #[arg(long, value_name = "FILE")]
     pub bind: PathBuf,
-    /// What is done with them.
+    /// How to use the devices.
     #[arg(long, value_enum, default_value_t = DeployMode::Dry)]
     pub mode: DeployMode,
-    /// Where to keep the journal; needed unless nothing is sent.
+    /// The file of the journal; required if anything is sent.
     #[arg(long, value_name = "FILE")]
     pub journal: Option<PathBuf>,
-    /// Where to keep the journal with program, bindings and report: a folder that `matterixc verify` checks.
+    /// The folder for the journal with program, bindings and report; `matterixc verify` checks it.
     #[arg(long, value_name = "FOLDER", conflicts_with = "journal")]
     pub record: Option<PathBuf>,
-    /// Go on with a deployment that was cut off, from its journal.
+    /// Resume an interrupted deployment from its journal.
     #[arg(long)]
     pub resume: bool,
-    /// With `--resume`, vouch that the journal is the newest: nothing on this machine says how far it got.
+    /// With `--resume`, confirm that the journal is the newest, if this computer has no record of its last line.
     #[arg(long, requires = "resume")]
     pub vouch: bool,
-    /// Serve a page on this machine that shows what goes on, and where people answer, pause, go on and stop; its address is printed.
+    /// Serve a page on this computer to follow, pause, continue and stop the deployment and to answer questions; its address is printed.
     #[arg(long)]
     pub view: bool,
-    /// The port of that page; 0 takes any that is free.
+    /// The port of that page; 0 takes any free port.
     #[arg(long, value_name = "PORT", default_value_t = 0, requires = "view")]
     pub port: u16,
-    /// Show all bytes that go out and come in.
+    /// Show all sent and received bytes.
     #[arg(long)]
     pub trace: bool,
-    /// Take every question and every step by hand for confirmed.
+    /// Confirm every question and every manual step automatically.
     #[arg(long)]
     pub yes: bool,
-    /// Let lab time pass so many times as fast: only where all devices are emulators that do the same.
+    /// Speed up lab time by this factor: only if all devices are emulators at the same speed.
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
     pub speed: f64,
-    /// Where all randomness of the simulation starts.
+    /// The seed of the simulation.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
 }
@@ -470,9 +472,9 @@ pub struct DeployArgs {
 pub enum DeployMode {
     /// Send nothing, and print every byte that would be sent.
     Dry,
-    /// Run on the digital twin first, and on devices only where that passes.
+    /// Run on the digital twin first, and on devices only if that passes.
     SimFirst,
-    /// Run on devices, and stop where they are not where the twin is.
+    /// Run on devices, and stop if they differ from the twin.
     Shadow,
     /// Run on devices.
     Real,
@@ -489,25 +491,25 @@ pub struct EmulateArgs {
     /// The lab the device stands in, with what is around it.
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
-    /// A workflow of the lab, where the file has several labs.
+    /// A workflow of the lab, if the file has several labs.
     #[arg(long, value_name = "NAME", requires = "file")]
     pub workflow: Option<String>,
-    /// The driver, where the device has several.
+    /// The driver, if the device has several.
     #[arg(long, value_name = "NAME")]
     pub driver: Option<String>,
-    /// Answer at a pseudo-terminal; its path is printed.
+    /// Answer on a pseudo-terminal; its path is printed.
     #[arg(long)]
     pub pty: bool,
-    /// Where to put a link to the pseudo-terminal.
+    /// The path of a link to the pseudo-terminal.
     #[arg(long, value_name = "PATH", requires = "pty")]
     pub link: Option<PathBuf>,
-    /// Answer at a port of this machine; 0 takes any that is free.
+    /// Answer on a port of this computer; 0 takes any free port.
     #[arg(long, value_name = "PORT")]
     pub tcp: Option<u16>,
-    /// Let lab time pass so many times as fast.
+    /// Speed up lab time by this factor.
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
     pub speed: f64,
-    /// Where the noise of readings starts.
+    /// The seed of the noise of readings.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
 }
@@ -516,7 +518,7 @@ pub struct EmulateArgs {
 #[cfg(feature = "sila")]
 #[derive(Debug, Args)]
 pub struct DiscoverArgs {
-    /// How long to wait for answers, s.
+    /// How long to wait for replies, s.
     #[arg(long = "for", value_name = "SECONDS", default_value_t = 3.0, value_parser = waiting)]
     pub time: f64,
 }
@@ -525,7 +527,7 @@ pub struct DiscoverArgs {
 #[cfg(feature = "sila")]
 fn waiting(text: &str) -> Result<f64, String> {
     let time = text.parse::<f64>().ok().filter(|time| (0.1..=600.0).contains(time));
-    time.ok_or_else(|| format!("`{text}` is no time from 0.1 s to 600 s"))
+    time.ok_or_else(|| format!("`{text}` is not a time from 0.1 s to 600 s"))
 }
 
 /// `matterixc serve`.
@@ -535,46 +537,46 @@ pub struct ServeArgs {
     /// The file of the lab.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// A workflow of the lab, where the file has several labs.
+    /// A workflow of the lab, if the file has several labs.
     #[arg(long, value_name = "NAME")]
     pub workflow: Option<String>,
-    /// The port; 0 takes any that is free.
+    /// The port; 0 takes any free port.
     #[arg(long, value_name = "PORT")]
     pub tcp: u16,
-    /// The address of this machine to answer at; 0.0.0.0 is every one it has.
+    /// The address of this computer to listen on; 0.0.0.0 means all of them.
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
     pub host: String,
-    /// Do not encrypt connections: whoever is on the network can read and change what is said.
+    /// Do not encrypt connections: anyone on the network can read and change messages.
     #[arg(long, conflicts_with_all = ["certificate", "users"])]
     pub insecure: bool,
-    /// The certificate to show, in PEM, with those that signed it behind it; the server's own without it.
+    /// The certificate in PEM, followed by those that signed it; without it, the server makes its own.
     #[arg(long, value_name = "FILE", requires = "key")]
     pub certificate: Option<PathBuf>,
     /// The private key of the certificate, in PEM.
     #[arg(long, value_name = "FILE", requires = "certificate")]
     pub key: Option<PathBuf>,
-    /// Who must log in before they call: names and passwords as `htpasswd -B` writes them.
+    /// A file of users who must log in: names and passwords as written by `htpasswd -B`.
     #[arg(long, value_name = "FILE")]
     pub users: Option<PathBuf>,
-    /// Do not say to the network that the server is there.
+    /// Do not announce the server on the network.
     #[arg(long)]
     pub no_discovery: bool,
-    /// The identifier of the server; without it, the same whenever this lab of this file is served on this machine.
+    /// The identifier of the server; the default stays the same for this lab of this file on this computer.
     #[arg(long, value_name = "UUID")]
     pub uuid: Option<String>,
-    /// Where the devices of the lab are; the digital twin answers without it.
+    /// The bindings: where the devices of the lab are; without it the digital twin answers.
     #[arg(long, value_name = "FILE")]
     pub bind: Option<PathBuf>,
-    /// Where to keep the journal of what is said to devices; needed where there are some.
+    /// The file of the journal; required with devices.
     #[arg(long, value_name = "FILE", requires = "bind")]
     pub journal: Option<PathBuf>,
-    /// Show all bytes that go to devices and come from them.
+    /// Show all bytes sent to devices and received from them.
     #[arg(long, requires = "bind")]
     pub trace: bool,
-    /// Let lab time pass so many times as fast.
+    /// Speed up lab time by this factor.
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
     pub speed: f64,
-    /// Where the noise of readings starts.
+    /// The seed of the noise of readings.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
 }
@@ -585,19 +587,19 @@ pub struct EmitArgs {
     /// What is compiled.
     #[command(flatten)]
     pub subject: Subject,
-    /// What kind of file.
+    /// The format of the file.
     #[arg(long, value_enum, value_name = "KIND")]
     pub target: Target,
-    /// Where to write it; to standard output without it.
+    /// The output file; without it, standard output.
     #[arg(long, short, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Give it to the device that these bindings say, and wait until that has run it.
+    /// Send it to the device in these bindings, and wait until the device has run it.
     #[arg(long, value_name = "BINDINGS", conflicts_with = "out")]
     pub play: Option<PathBuf>,
-    /// Where all randomness of the performance starts that is written down.
+    /// The seed of the written run.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    /// Plan all motions again instead of using the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
 }
@@ -614,19 +616,19 @@ pub enum Foreign {
 /// `matterixc import`.
 #[derive(Debug, Args)]
 pub struct ImportArgs {
-    /// What kind of file it is.
+    /// The format of the file.
     #[arg(value_enum, value_name = "KIND")]
     pub kind: Foreign,
     /// The file.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// Take species of these elements only, beside hydrogen and oxygen: `Ca,C,Cl`.
+    /// Import only species of these elements, besides hydrogen and oxygen: `Ca,C,Cl`.
     #[arg(long, value_name = "ELEMENTS", value_delimiter = ',')]
     pub elements: Vec<String>,
-    /// Take these solid phases, as the database calls them: `Calcite,Gypsum`. Without it no solid is taken, so that nothing precipitates.
+    /// Import these solid phases, by their names in the database: `Calcite,Gypsum`. Without it no solid is imported, and nothing precipitates.
     #[arg(long, value_name = "PHASES", value_delimiter = ',')]
     pub phases: Vec<String>,
-    /// Where to write the module; to standard output without it.
+    /// The file of the module; without it, standard output.
     #[arg(long, short, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -634,10 +636,10 @@ pub struct ImportArgs {
 /// `matterixc verify`.
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// The recording that a run has written, the folder it is in, or the record of a deployment.
+    /// The recording of a run, its folder, or the record of a deployment.
     #[arg(value_name = "RUN")]
     pub recording: PathBuf,
-    /// Form of the verdict.
+    /// The format of the verdict.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,
 }
@@ -645,13 +647,13 @@ pub struct VerifyArgs {
 /// `matterixc view`.
 #[derive(Debug, Args)]
 pub struct ViewArgs {
-    /// What is shown: a program, or the recording that a run has written (or the folder it is in).
+    /// A program, or the recording of a run (or its folder).
     #[command(flatten)]
     pub subject: Subject,
-    /// Port on this machine to serve the page at; 0 takes any that is free.
+    /// The port of the page on this computer; 0 takes any free port.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub port: u16,
-    /// Write the page to a file that opens by itself, and serve nothing.
+    /// Write the page to a self-contained file instead of serving it.
     #[arg(long, value_name = "FILE", conflicts_with = "port")]
     pub export: Option<PathBuf>,
 }
@@ -659,7 +661,7 @@ pub struct ViewArgs {
 /// `matterixc mcp`.
 #[derive(Debug, Args)]
 pub struct McpArgs {
-    /// The folder whose protocols it works on; nothing outside of it is read or written.
+    /// The folder of the protocols; nothing outside of it is read or written.
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub root: PathBuf,
 }
@@ -667,9 +669,9 @@ pub struct McpArgs {
 /// `matterixc explain`.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
-    /// A code as in `error[CODE]`, the name of a failure, or a family such as `U1`; all codes without it.
+    /// A code as in `error[CODE]`, the name of a failure, or a family such as `U1`; without it, all codes.
     pub code: Option<String>,
-    /// Files that give the name, for failures and hazards of your own.
+    /// Files that declare the name, for your own failures and hazards.
     pub files: Vec<PathBuf>,
     /// Print the index of the pages.
     #[arg(long, hide = true)]
@@ -681,10 +683,10 @@ pub struct ExplainArgs {
 pub struct SubstanceArgs {
     /// A name, a formula, a CAS number or a SMILES: `acetone`, `C3H6O`, `67-64-1`, `CC(C)=O`.
     pub name: String,
-    /// Also look among the species of this file.
+    /// Also search the species of this file.
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
-    /// Form of the answer.
+    /// The format of the answer.
     #[arg(long, value_enum, default_value_t = SubstanceFormat::Human)]
     pub format: SubstanceFormat,
 }

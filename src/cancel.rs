@@ -23,7 +23,7 @@ pub fn last_words(say: fn() -> String) {
 
 /// From here on Ctrl-C, Ctrl-\, a request to terminate and a terminal that is closed set the flag returned.
 pub fn on_interrupt() -> Result<&'static AtomicBool, String> {
-    listen("\nstopping: what `finally` says is done first; Ctrl-C again ends at once\n")
+    listen("\nstopping: `finally` runs first; Ctrl-C again ends at once\n")
 }
 
 /// The same for what can stop at once, with nothing to say.

@@ -126,7 +126,7 @@ pub fn replace(path: &Path, text: impl AsRef<[u8]>) -> Result<(), String> {
     let there = fs::metadata(&target).map_err(failed)?;
     // A pipe or a device in its place is not to be lost.
     if !there.is_file() {
-        return Err(format!("cannot write `{}`: it is no regular file", path.display()));
+        return Err(format!("cannot write `{}`: it is not a regular file", path.display()));
     }
     let permissions = there.permissions();
     if permissions.readonly() {
@@ -161,7 +161,7 @@ pub fn create_folder(dir: &Path, files: &[(&str, &str)]) -> Result<(), String> {
     let failed = |e: io::Error| format!("cannot create `{}`: {}", dir.display(), reason(&e));
     let exists = match fs::read_dir(dir).map(|mut entries| entries.next().is_none()) {
         Ok(true) => true,
-        Ok(false) => return Err(format!("`{}` exists and is not empty", dir.display())),
+        Ok(false) => return Err(format!("`{}` already exists and is not empty", dir.display())),
         Err(e) if e.kind() == io::ErrorKind::NotFound => false,
         Err(e) => return Err(failed(e)),
     };
@@ -184,7 +184,7 @@ pub fn create_folder(dir: &Path, files: &[(&str, &str)]) -> Result<(), String> {
 /// Why an operation on a file failed, without the number of the system's error.
 pub fn reason(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::NotFound => "there is no such file".to_string(),
+        io::ErrorKind::NotFound => "the file does not exist".to_string(),
         io::ErrorKind::PermissionDenied => "permission denied".to_string(),
         io::ErrorKind::NotADirectory => "part of the path is not a directory".to_string(),
         _ => {

@@ -13,7 +13,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
 ];
 
 /// What `help` does, which clap says once it has parsed.
-const HELP: &str = "Print this message or the help of a subcommand";
+const HELP: &str = "Print this message or the help of a command";
 
 /// The command line.
 pub fn cli() -> clap::Command {

@@ -9,7 +9,7 @@ use etcetera::{BaseStrategy, choose_base_strategy};
 use matterix_sila_wire::tls::{Identity, own};
 
 fn folder(instead: &str) -> Result<PathBuf, String> {
-    let base = choose_base_strategy().map_err(|_| format!("the user has no folder for data: say {instead}"))?;
+    let base = choose_base_strategy().map_err(|_| format!("this user has no data folder: use {instead}"))?;
     Ok(base.data_dir().join(env!("CARGO_PKG_NAME")))
 }
 
@@ -23,8 +23,7 @@ pub fn of(file: &Path, lab: &str) -> Result<String, String> {
 /// The identifier in a folder under a name.
 fn noted(folder: &Path, name: &str) -> Result<String, String> {
     let list = folder.join("servers");
-    let failed =
-        |e: std::io::Error| format!("the identifier of the server cannot be kept in `{}`: {e}", list.display());
+    let failed = |e: std::io::Error| format!("cannot store the identifier of the server in `{}`: {e}", list.display());
     let find = || match fs::read_to_string(&list) {
         Ok(text) => Ok(text.lines().find_map(|line| {
             let (uuid, of) = line.split_once(' ')?;
@@ -65,7 +64,7 @@ fn kept(folder: &Path, uuid: &str, hosts: &[String]) -> Result<(Identity, PathBu
     if let Some(identity) = read() {
         return Ok((identity, shown));
     }
-    let failed = |e: std::io::Error| format!("the certificate cannot be kept in `{}`: {e}", folder.display());
+    let failed = |e: std::io::Error| format!("cannot store the certificate in `{}`: {e}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
     let mut made = own(uuid, hosts)?;
     made.chain = format!("{HOSTS}{}\n{}", hosts.join(", "), made.chain);

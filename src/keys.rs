@@ -7,19 +7,18 @@ use matterix_hardware::deploy::{Answer, Control, Gate, Notice, Taken};
 use crate::cancel;
 use crate::terminal::{Stream, print};
 
-const STOPPING: &str = "stopping: devices are halted, what `finally` says is done; Ctrl-C ends at once\n";
-const PAUSING: &str = "pausing: what goes on ends, nothing new begins; r and Enter goes on, s lets one step begin\n";
+const STOPPING: &str = "stopping: devices are halted, then `finally` runs; Ctrl-C ends at once\n";
+const PAUSING: &str = "pausing: running steps end, no new step starts; r and Enter continues, s starts one step\n";
 /// What is said where a deployment that was paused is gone on with.
-pub const STILL_PAUSED: &str = "it was paused and still is: r and Enter goes on, s lets one step begin\n";
-const GOING_ON: &str = "going on\n";
+pub const STILL_PAUSED: &str = "still paused: r and Enter continues, s starts one step\n";
+const GOING_ON: &str = "continuing\n";
 const STEPPING: &str = "one step\n";
-const HINT: &str = "q and Enter stops, p pauses, r goes on, s lets one step begin\n";
-const OVERTAKEN: &str =
-    "that answers nothing: the question before was withdrawn, answered elsewhere, or only just answered\n";
+const HINT: &str = "q and Enter stops, p pauses, r continues, s starts one step\n";
+const OVERTAKEN: &str = "this answers no question: the previous one was withdrawn or already answered\n";
 const CONFIRM: &str = "type y and Enter to confirm, n to stop: ";
 
 /// Who does not confirm what is asked when the terminal has gone.
-const GONE: &str = "nobody, as the terminal is gone,";
+const GONE: &str = "nobody, because the terminal was closed,";
 
 /// So many ends of the input in a row are those of a terminal that is gone.
 const MOST_ENDS: usize = 20;
@@ -41,12 +40,12 @@ enum Word {
 pub fn show(notice: Notice<'_>) {
     let text = match notice {
         Notice::Prompt(text) => format!("{text}\n{CONFIRM}"),
-        Notice::Waits(text) => format!("\nasked next: {text}\nfirst the question before: {CONFIRM}"),
+        Notice::Waits(text) => format!("\nnext question: {text}\nfirst the previous question: {CONFIRM}"),
         Notice::Answered(text) => format!("{text}\n"),
         Notice::Heard(text, answer) => {
             format!("{} by {}: {text}\n", if answer.yes { "confirmed" } else { "not confirmed" }, answer.who)
         }
-        Notice::Withdrawn(text) => format!("\nno longer asked: {text}\n"),
+        Notice::Withdrawn(text) => format!("\nwithdrawn: {text}\n"),
     };
     print(Stream::Err, &text);
 }

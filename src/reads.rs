@@ -39,7 +39,7 @@ impl Account {
             let bytes = files::contents(path, entry.largest).map_err(|why| format!("`{}`: {why}", path.display()))?;
             match entry.found == Some(mark(&bytes)) {
                 true => Ok((path.clone(), bytes)),
-                false => Err(format!("`{}` has changed meanwhile", path.display())),
+                false => Err(format!("`{}` has changed in the meantime", path.display())),
             }
         };
         found.map(read).collect()

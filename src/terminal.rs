@@ -66,7 +66,7 @@ pub fn finish() {
     let left_out: u64 = WAITING.iter().map(|stream| stream.drained(LAST)).sum();
     if left_out > 0 {
         let lines = if left_out == 1 { "1 line was".to_owned() } else { format!("{left_out} lines were") };
-        print(Stream::Err, &format!("{lines} left out here, as nobody read them; a journal has what was done\n"));
+        print(Stream::Err, &format!("{lines} not shown because nobody read them; a journal has all of them\n"));
         WAITING[1].drained(LAST);
     }
 }

@@ -36,7 +36,7 @@ impl Index {
                 format!("`{}`: {what}{sort}", self.text(found.span))
             }
             Meaning::Open => {
-                format!("`{}`: a member of what is given; its type is left open here", self.text(found.span))
+                format!("`{}`: a member of an argument whose type is open here", self.text(found.span))
             }
             Meaning::Unknown => return None,
         };

@@ -15,14 +15,14 @@ use crate::references::{Place, references};
 
 /// The name at a place, if it can be changed; why not otherwise.
 pub fn prepare(index: &Index, file: FileId, offset: usize) -> Result<(Span, DefId), String> {
-    let found = index.at(file, offset).ok_or("there is no name here")?;
+    let found = index.at(file, offset).ok_or("no name at this place")?;
     let text = index.text(found.span);
     let def = match found.meaning {
         Meaning::Def(def) => def,
-        Meaning::Module(_) => return Err(format!("`{text}` is a module: it has the name of its file")),
+        Meaning::Module(_) => return Err(format!("`{text}` is a module, named by its file")),
         Meaning::Language(what) => return Err(format!("`{text}` is a word of the language: {what}")),
-        Meaning::Open => return Err(format!("what `{text}` belongs to is not known here: its type is left open")),
-        Meaning::Unknown => return Err(format!("it is not known what `{text}` is")),
+        Meaning::Open => return Err(format!("the owner of `{text}` is unknown: its type is open here")),
+        Meaning::Unknown => return Err(format!("`{text}` is unknown")),
     };
     let d = index.def(def);
     if index.is_library(d.span.file) {
@@ -31,29 +31,29 @@ pub fn prepare(index: &Index, file: FileId, offset: usize) -> Result<(Span, DefI
     if index.sources().get(d.span.file).is_none_or(|s| !s.name.ends_with(".mtx"))
         && !index.own_files().any(|f| f == d.span.file)
     {
-        return Err(format!("`{}` comes from a file that is no text of the language", d.name));
+        return Err(format!("`{}` comes from a file in another format", d.name));
     }
     if d.kind == Kind::Setting && FIXED.contains(&d.name.as_str()) {
-        return Err(format!("`{}` is a setting that laws read by this name", d.name));
+        return Err(format!("laws read the setting `{}` by this name", d.name));
     }
     if d.kind == Kind::Word {
-        return Err(format!("`{}` is a word of a state: types are the same if their words are", d.name));
+        return Err(format!("`{}` is a word of a state: types are equal if their words are", d.name));
     }
     if index.text(d.span) != d.name && !matches!(d.kind, Kind::Skill | Kind::Command) {
-        return Err(format!("`{}` is not written out where it comes from", d.name));
+        return Err(format!("the declaration of `{}` does not contain its name", d.name));
     }
     if d.kind == Kind::Failure && index.failure_places(&d.name).iter().any(|s| index.is_library(s.file)) {
-        return Err(format!("`{}` is a failure of the standard library, too", d.name));
+        return Err(format!("`{}` is also a failure of the standard library", d.name));
     }
     if index.is_implicit(def) {
-        return Err(format!("a call of the function takes `{}` from where it stands, by its name", d.name));
+        return Err(format!("calls of the function take `{}` from their surroundings by its name", d.name));
     }
     if let Some(other) = index.redeclared(def) {
         let (kind, owner) = (index.def(other).kind.word(), index.def(other).owner.map(|o| index.def(o).name.clone()));
-        return Err(format!("`{}` is a {kind} of `{}`, too, and declared again", d.name, owner.unwrap_or_default()));
+        return Err(format!("`{}` is also declared as a {kind} of `{}`", d.name, owner.unwrap_or_default()));
     }
     if index.is_spoken(&d.name) {
-        return Err(format!("`{}` is named in a text in quotes", d.name));
+        return Err(format!("a quoted text contains the name `{}`", d.name));
     }
     Ok((found.span, def))
 }
@@ -168,7 +168,7 @@ impl Index {
         let d = self.def(def);
         let already = |other: DefId| {
             let o = self.def(other);
-            Some(format!("`{name}` is the name of a {} already", o.kind.word()))
+            Some(format!("`{name}` is already the name of a {}", o.kind.word()))
         };
         // What has the same owner.
         if let Some(owner) = d.owner {
@@ -187,13 +187,13 @@ impl Index {
             }
         }
         if matches!(d.kind, Kind::Unit | Kind::Dimension) {
-            return self.units().find(name).is_some().then(|| format!("`{name}` is a unit already"));
+            return self.units().find(name).is_some().then(|| format!("`{name}` is already a unit"));
         }
         if d.kind == Kind::Failure && self.failure(name).is_some() {
-            return Some(format!("`{name}` is a failure already"));
+            return Some(format!("`{name}` is already a failure"));
         }
         if matches!(d.kind, Kind::Skill | Kind::Command) && self.verbs(name).next().is_some() {
-            return Some(format!("`{name}` is a verb already"));
+            return Some(format!("`{name}` is already a verb"));
         }
         // What would be hidden where it is named, or hide it.
         for span in self.references(def) {
@@ -205,7 +205,7 @@ impl Index {
         for used in self.all_uses().filter(|u| !self.is_library(u.span.file) && self.text(u.span) == name) {
             let seen = self.named_at(used.span.file, used.span.start as usize, &d.name);
             if seen == Some(def) && used.meaning != Meaning::Def(def) {
-                return Some(format!("`{name}` is named where `{}` is seen, and would mean it", d.name));
+                return Some(format!("uses of `{name}` would then mean `{}`", d.name));
             }
         }
         None

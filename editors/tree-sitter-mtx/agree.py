@@ -23,7 +23,7 @@ ROOT = HERE.parent.parent
 
 # What the compiler says under `syntax` of texts that fit the grammar: the version, numbers beyond any, values in texts.
 NOT_GRAMMAR = re.compile(
-    r"does not start with `mtx 1`|is not a version of the language|number is too large|in a text stands for a value|in this text"
+    r"does not start with `mtx 1`|is not a known version of the language|number is too large|in a text starts or ends a value|in this text"
 )
 ITEM = re.compile(
     r"^(?:use|dimension|unit|species|solution|reaction|reactive_group|material|incompatible|allow|hazard|caution|capability|asset|process"

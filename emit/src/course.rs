@@ -134,59 +134,56 @@ pub fn open(
             Step::If { condition, .. } | Step::RepeatWhile { condition, .. } if !decided(condition) => say(
                 own(condition.span),
                 format!("{what} cannot branch on `{}`", condition.text),
-                "is known only while it runs",
-                "branch on what the text decides, or write one workflow for each case",
+                "known only during the run",
+                "branch on a value known from the text, or write one workflow for each case",
             ),
             Step::Repeat { times, .. } if course.is_open(*times) => say(
                 at,
-                format!("{what} needs to know how often this is repeated"),
-                "is known only while it runs",
-                "repeat as often as the text says",
+                format!("{what} needs a fixed number of turns"),
+                "known only during the run",
+                "write the number of turns",
             ),
-            Step::Wait { duration } if course.is_open(*duration) => say(
-                at,
-                format!("{what} needs to know how long this takes"),
-                "is known only while it runs",
-                "wait as long as the text says",
-            ),
+            Step::Wait { duration } if course.is_open(*duration) => {
+                say(at, format!("{what} needs a fixed duration"), "known only during the run", "write the duration")
+            }
             Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } if !means.conditions => say(
                 own(condition.span),
                 format!("{what} cannot wait for `{}`", condition.text),
-                "is known only while it runs",
-                "wait for a time that is long enough: `wait 10 min`",
+                "known only during the run",
+                "wait for a fixed, sufficient time: `wait 10 min`",
             ),
             Step::Keep { condition, .. } if !decided(condition) => say(
                 own(condition.span),
-                format!("{what} cannot watch over `{}`", condition.text),
-                "is known only while it runs",
-                "leave the watch out, and judge a run with `matterixc run`",
+                format!("{what} cannot monitor `{}`", condition.text),
+                "known only during the run",
+                "remove `keep`, and judge a run with `matterixc run`",
             ),
             Step::Within { .. } if !means.beside => say(
                 at,
-                format!("{what} has no clock to begin this in time by"),
+                format!("{what} has no clock for this time window"),
                 "a window of time",
-                "leave the window out; `matterixc check` tells whether it can be kept",
+                "remove the window; `matterixc check` tells if it can be kept",
             ),
             Step::Guarded { handlers, .. } if !means.handlers => {
                 handled.extend(handlers.iter().map(|(_, handler)| (at, plan.get(*handler).span)));
             }
             Step::Try(list) if list.len() > 1 && !means.handlers => say(
                 at,
-                format!("{what} ends with the first failure: the other way would never be tried"),
-                "has alternatives",
-                "write the way that is meant",
+                format!("{what} ends with the first failure: it would never try the alternative"),
+                "alternatives",
+                "write one of the alternatives",
             ),
             Step::Parallel(list) if list.len() > 1 && !means.beside => say(
                 at,
-                format!("{what} does one thing after the other"),
-                "is done at the same time",
-                "write `sequence`, in the order that is meant",
+                format!("{what} does one step after the other"),
+                "steps at the same time",
+                "write `sequence`, in the intended order",
             ),
             Step::Start { .. } if !means.beside => say(
                 at,
-                format!("{what} does one thing after the other"),
-                "goes on beside what follows",
-                "write it where it is to be done",
+                format!("{what} does one step after the other"),
+                "runs beside the next steps",
+                "put its steps where they should run",
             ),
             _ => {}
         }
@@ -198,9 +195,9 @@ pub fn open(
             let label = format!("`{}` depends on it", plan.get(act.step).label);
             say(
                 at,
-                format!("{what} needs to know every value beforehand"),
+                format!("{what} needs every value before the run"),
                 &label,
-                "write the value, not what is measured",
+                "write a fixed value instead of a measured one",
             );
         }
     }
@@ -210,8 +207,8 @@ pub fn open(
             let label = "a skill of the library handles a failure here";
             Diagnostic::warning(codes::NOT_EXPRESSIBLE, at, headline, label)
         } else {
-            let help = "leave the handler out; a run that fails is looked after by whoever stands there";
-            not_expressible(handler, headline, "is for a failure").help(help)
+            let help = "remove the handler: a person must look after a run that fails";
+            not_expressible(handler, headline, "a failure handler").help(help)
         });
     }
     in_order(found)

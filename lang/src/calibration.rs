@@ -60,8 +60,9 @@ pub(crate) fn put(measured: &Calibration, module: &mut Arc<Module>, sources: &mu
         }
         if !is_there {
             let headline = format!("no lab of this file declares `{}` itself", thing.0);
-            let d = Diagnostic::error(codes::BINDING, span(&thing.1), headline, "what it gives is not known here");
-            found.push(d.help("say what was measured of things that the file's own lab names"));
+            let d =
+                Diagnostic::error(codes::BINDING, span(&thing.1), headline, "its measured values have no place here");
+            found.push(d.help("give measured values only for things that the file's own lab declares"));
         }
     }
     found

@@ -28,9 +28,9 @@ pub fn undeclared(sig: &Sig, clauses: &[Clause], within: Span, steps: &[PlanStep
     escapes.retain(|name, _| !declared.contains(&name.as_str()));
     let at = *escapes.values().min()?;
     let verb = verb_text(&sig.verb);
-    let headline = format!("`{verb}` may fail with {}, which it does not declare", quoted(&escapes));
+    let headline = format!("`{verb}` may fail with {} but does not declare it", quoted(&escapes));
     let mut d = Diagnostic::error(codes::UNDECLARED_FAILURE, at, headline, "fails here");
-    d = d.because(sig.span, "whoever calls it reads its failures here");
+    d = d.because(sig.span, "callers read its failures here");
     let names = escapes.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
     let (title, place, text) = match clauses.iter().filter_map(fails).flatten().last() {
         Some(last) => (format!("add {} to its `fails`", quoted(&escapes)), last.span, format!(", {names}")),
@@ -50,8 +50,8 @@ pub fn unhandled(plan: &Plan, name: Span, within: Span) -> Option<Diagnostic> {
     let headline = format!("`{}` has no handler for {}", plan.workflow, quoted(&escapes));
     let d = Diagnostic::advice(codes::UNHANDLED_FAILURE, at, headline, "may fail here");
     Some(
-        d.because(name, "ends then, after its `finally`")
-            .help("add `on NAME { }` or `on failure { }` where the run can go on"),
+        d.because(name, "the workflow ends then, after its `finally`")
+            .help("add `on NAME { }` or `on failure { }` where the run can continue"),
     )
 }
 

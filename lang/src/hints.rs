@@ -8,17 +8,15 @@ pub fn of_verb(word: &str) -> Option<&'static str> {
         }
         "drop_tip" => "write `drop tip by PIPETTE`",
         "cool" | "chill" => {
-            "`heat DEVICE to 4 degC` sets a device that cools as well; after `stop heating DEVICE` any other cools by itself: \
-             `wait until VESSEL.contents.temperature <= 30 degC timeout 1 h`"
+            "`heat DEVICE to 4 degC` also sets a device that can cool; after `stop heating DEVICE` any other device cools by itself: `wait until VESSEL.contents.temperature <= 30 degC timeout 1 h`"
         }
         "warm" | "incubate" => "write `heat DEVICE to 37 degC`, then `wait 30 min`",
         "add" | "fill" | "dispense_liquid" => {
-            "what a vessel begins with stands in the lab: `holding 10 mL of water`; later `transfer` brings liquids over with a pipette, \
-             `pump` with a pump, `pour` with an arm, and `dose` a powder"
+            "the lab declares the initial contents of a vessel: `holding 10 mL of water`; later `transfer` moves liquids with a pipette, `pump` with a pump, `pour` with an arm, and `dose` doses a powder"
         }
         "dilute" => "write `transfer 100 uL from DILUENT to WELLS by PIPETTE using RACK { tips: each }`, then `mix`",
         "aliquot" | "distribute" => {
-            "`transfer` goes from one source to many targets: `transfer 50 uL from A to plate.column(1) ...`"
+            "`transfer` can move liquid from one source to many targets: `transfer 50 uL from A to plate.column(1) ...`"
         }
         "centrifuge" => "write `spin CENTRIFUGE at 3000 rpm using 5 min`",
         "vortex" | "agitate" => "write `shake SHAKER at 500 rpm` or `stir PLATE at 300 rpm`",
@@ -27,12 +25,11 @@ pub fn of_verb(word: &str) -> Option<&'static str> {
             "write `note \"...\"`, with values in braces: `note \"{plate.temperature as degC :.1}\"`"
         }
         "measure" => {
-            "a reading is a value: `let t = PLATE.temperature`; `weigh` puts a thing on a balance and reads it"
+            "use a reading as a value: `let t = PLATE.temperature`; `weigh` puts a thing on a balance and reads it"
         }
         "filter" | "filtrate" | "evaporate" | "distill" | "distil" | "reflux" | "crystallise" | "crystallize"
         | "extract" | "sonicate" => {
-            "no module of the library does this, and no model follows it: describe it as a `skill` with its effect, or ask a person: \
-             `ask \"...\"`"
+            "the library has no verb and no model for this: describe it as a `skill` with its effect, or ask a person: `ask \"...\"`"
         }
         "discard" | "throw" => "write `dispose THING into BIN`, or `drop tip by PIPETTE`",
         "loop" | "while" => {
@@ -46,7 +43,7 @@ pub fn of_verb(word: &str) -> Option<&'static str> {
 pub fn of_function(word: &str) -> Option<&'static str> {
     Some(match word {
         "range" => {
-            "write `repeat 3 times { }`; `for` goes through a list: `for v in [10 uL, 20 uL]`, `for well in plate.wells`"
+            "write `repeat 3 times { }`; `for` loops over a list: `for v in [10 uL, 20 uL]`, `for well in plate.wells`"
         }
         "len" | "length" | "size" => "write `LIST.count`",
         "print" => "write `note \"...\"`",
@@ -57,4 +54,4 @@ pub fn of_function(word: &str) -> Option<&'static str> {
 
 /// What is written in place of going through a range.
 pub const OF_RANGE: &str =
-    "write `repeat 3 times { }`, a list `[1, 2, 3]`, or places: `plate.wells`, `plate.column(1)`, `plate[A1 .. A12]`";
+    "write `repeat 3 times { }`, a list `[1, 2, 3]`, or wells: `plate.wells`, `plate.column(1)`, `plate[A1 .. A12]`";

@@ -81,13 +81,13 @@ pub fn features(
     for item in &mut tree.items {
         let ItemKind::Capability { name, source: Some((word, path)), members, .. } = &mut item.kind else { continue };
         if word.text != FEATURE {
-            let headline = format!("a capability does not come from `{}`", word.text);
-            let d = Diagnostic::error(codes::MISPLACED, word.span, headline, "not a format of capabilities");
-            found.push(d.help(format!("it may come from `{FEATURE}`, a feature of SiLA 2")));
+            let headline = format!("a capability cannot be imported from `{}`", word.text);
+            let d = Diagnostic::error(codes::MISPLACED, word.span, headline, "not a format for capabilities");
+            found.push(d.help(format!("use `{FEATURE}`, a feature of SiLA 2")));
             continue;
         }
         let read = text(file, &path.text, loader).and_then(|text| {
-            matterix_sila::read(&text).map_err(|p| format!("`{}` is no feature of SiLA 2: {p}", path.text))
+            matterix_sila::read(&text).map_err(|p| format!("`{}` is not a feature of SiLA 2: {p}", path.text))
         });
         let feature = match read {
             Ok(feature) => feature,
@@ -100,7 +100,7 @@ pub fn features(
         let declared = sila::declarations(&feature, &name.text, units, sila::declared(members));
         if !declared.left_out.is_empty() {
             let list: Vec<String> = declared.left_out.iter().map(|(what, why)| format!("`{what}`, {why}")).collect();
-            let headline = format!("not all of `{}` can be used: {}", feature.identifier, list.join("; "));
+            let headline = format!("these parts of `{}` cannot be used: {}", feature.identifier, list.join("; "));
             found.push(Diagnostic::advice(codes::SILA_FILE, path.span, headline, "in this file"));
         }
         let written = sources.add(format!("{} as `{}`", path.text, name.text), declared.text.as_str());
@@ -192,7 +192,7 @@ impl Beside<'_> {
                 let read =
                     self.loader.bytes(self.from, path).map_err(|reason| format!("cannot read `{path}`: {reason}"));
                 let mesh = read.and_then(|bytes| {
-                    matterix_mesh::read(path, &bytes).map_err(|reason| format!("`{path}` is no mesh: {reason}"))
+                    matterix_mesh::read(path, &bytes).map_err(|reason| format!("`{path}` is not a mesh: {reason}"))
                 });
                 let mesh = mesh.map_err(|headline| {
                     self.found.push(Diagnostic::error(codes::MESH_FILE, file.span, headline, "this file"));
@@ -219,7 +219,7 @@ impl Beside<'_> {
         match matterix_mesh::read(&path, &bytes) {
             Ok(mesh) => Some(Mesh { name: path, ..mesh }),
             Err(reason) => {
-                let headline = format!("`{path}` is no mesh: {reason}");
+                let headline = format!("`{path}` is not a mesh: {reason}");
                 self.found.push(Diagnostic::error(codes::MESH_FILE, description.span, headline, "named in this file"));
                 None
             }

@@ -49,8 +49,8 @@ pub fn labs<'a>(
         reasons.extend(lacking.first().map(|reason| format!("`{}`: {reason}", lab_name(tables, lab))));
     }
     if fitting.is_empty() {
-        let headline = format!("there is no lab in which `{}` can be done", name.text);
-        let mut d = Diagnostic::error(codes::UNBOUND_ROLE, name.span, headline, "in any lab");
+        let headline = format!("no lab of this file can run `{}`", name.text);
+        let mut d = Diagnostic::error(codes::UNBOUND_ROLE, name.span, headline, "needs a lab");
         if reasons.is_empty() {
             d = d.help("declare a lab in this file, or import one with `use`");
         }
@@ -81,8 +81,8 @@ pub fn lab<'a>(
         return found.ok_or_else(|| {
             let all = tables.names.visible(root).filter(|(_, id)| is_lab(&tables.names.decl(*id).item.kind));
             let near = near::nearest(wanted, all.map(|(n, _)| n));
-            let headline = format!("there is no lab `{wanted}`");
-            let mut d = Diagnostic::about(wanted, codes::UNKNOWN_NAME, name.span, headline, "asked for with `--lab`");
+            let headline = format!("unknown lab `{wanted}`");
+            let mut d = Diagnostic::about(wanted, codes::UNKNOWN_NAME, name.span, headline, "given with `--lab`");
             d.help.extend(near::question(&near));
             Box::new(d)
         });
@@ -99,13 +99,13 @@ pub fn lab<'a>(
         [one] => Ok(*one),
         many => {
             let names: Vec<String> = many.iter().map(|lab| format!("`{}`", lab_name(tables, *lab))).collect();
-            let headline = format!("`{}` can be done in {}: which one?", name.text, names.join(" or "));
-            let mut d = Diagnostic::error(codes::UNBOUND_ROLE, name.span, headline, "in any lab");
+            let headline = format!("`{}` can run in {}: choose one", name.text, names.join(" or "));
+            let mut d = Diagnostic::error(codes::UNBOUND_ROLE, name.span, headline, "needs a lab");
             for lab in many {
                 let span = item_name(tables.names.decl(*lab).item).map_or_else(Span::default, |n| n.1);
-                d = d.because(span, "this lab fits");
+                d = d.because(span, "this lab could run it");
             }
-            Err(Box::new(d.help(format!("say which with `--lab {}`", names[0].trim_matches('`')))))
+            Err(Box::new(d.help(format!("choose with `--lab {}`", names[0].trim_matches('`')))))
         }
     }
 }

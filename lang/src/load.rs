@@ -52,10 +52,10 @@ pub fn load(
                         Diagnostic::error(
                             codes::UNKNOWN_MODULE,
                             path.span,
-                            format!("there is no module `{module}`"),
+                            format!("unknown module `{module}`"),
                             "imported here",
                         )
-                        .help(format!("a module is a file: `{}.mtx` beside this one", module.replace("::", "/"))),
+                        .help(format!("a module is a file in the same folder: `{}.mtx`", module.replace("::", "/"))),
                     );
                 }
             }

@@ -30,10 +30,10 @@ impl Loader for LibraryOnly {
     }
 
     fn bytes(&self, _: FileId, _: &str) -> Result<Vec<u8>, String> {
-        Err("there is no such file".into())
+        Err("the file does not exist".into())
     }
 
     fn file(&self, _: FileId, _: &str) -> Result<String, String> {
-        Err("there is no such file".into())
+        Err("the file does not exist".into())
     }
 }

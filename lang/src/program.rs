@@ -495,8 +495,8 @@ fn choose_workflow(
             let mut d = Diagnostic::error(
                 codes::NO_WORKFLOW,
                 top,
-                format!("there is no workflow `{wanted}` in this file"),
-                "asked for with `--workflow`",
+                format!("this file has no workflow `{wanted}`"),
+                "given with `--workflow`",
             );
             d.help.extend(near::question(&near));
             if near.is_empty() && !list.is_empty() {
@@ -507,7 +507,7 @@ fn choose_workflow(
         }
         (None, [(_, id, _)]) => Some(*id),
         (None, []) => {
-            let d = Diagnostic::error(codes::NO_WORKFLOW, top, "there is no workflow in this file", "nothing to run");
+            let d = Diagnostic::error(codes::NO_WORKFLOW, top, "this file has no workflow", "nothing to run");
             diagnostics.push(d.help("add `workflow NAME in LAB { ... }`"));
             None
         }
@@ -516,13 +516,13 @@ fn choose_workflow(
             let mut d = Diagnostic::error(
                 codes::NO_WORKFLOW,
                 many[0].2,
-                format!("this file has {} workflows: which one?", many.len()),
+                format!("this file has {} workflows: choose one", many.len()),
                 "one of them",
             );
             for w in &many[1..] {
                 d = d.because(w.2, "another");
             }
-            diagnostics.push(d.help(format!("say which with `--workflow`: {}", list.join(", "))));
+            diagnostics.push(d.help(format!("choose with `--workflow`: {}", list.join(", "))));
             None
         }
     }

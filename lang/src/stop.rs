@@ -23,6 +23,6 @@ impl Stop {
 
 /// The finding of a check that was stopped from outside: what it would have found is not known.
 pub fn stopped(at: Span) -> Diagnostic {
-    Diagnostic::error(codes::BUDGET_SPENT, at, "the check was stopped before its end", "still at work here")
+    Diagnostic::error(codes::BUDGET_SPENT, at, "the check ran out of time", "`check` stopped here")
         .help("allow more time, or check a smaller protocol")
 }

@@ -21,9 +21,9 @@ pub(crate) fn found(
     let others: Vec<Choice> = chosen.iter().flat_map(others).collect();
     let mut out: Vec<Diagnostic> = Vec::new();
     if others.len() > MOST_VALUES {
-        let headline = format!("{MOST_VALUES} of {} other values of the parameters are tried", others.len());
+        let headline = format!("`check` tried only {MOST_VALUES} of {} other values of the parameters", others.len());
         let left: Vec<String> = others[MOST_VALUES..].iter().map(|c| format!("`{}: {}`", c.name, c.word)).collect();
-        let said = format!("branches that only {} takes are not checked", left.join(" or "));
+        let said = format!("branches that only {} would take are not checked", left.join(" or "));
         out.push(Diagnostic::warning(codes::NOT_ANALYSED, workflow, headline, said));
     }
     let tried = &others[..others.len().min(MOST_VALUES)];
@@ -56,5 +56,5 @@ fn with(mut d: Diagnostic, other: &Choice) -> Diagnostic {
     if !forbidden_on_any_way(d.code) {
         d.severity = Severity::Warning;
     }
-    d.help(format!("so it is with `{}` at `{}`", other.name, other.word))
+    d.help(format!("this also happens with `{}` = `{}`", other.name, other.word))
 }

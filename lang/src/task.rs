@@ -49,26 +49,27 @@ pub fn tested<'a>(tables: &Tables<'a>, test: DeclId) -> Result<Option<Tested<'a>
     let ItemKind::Test { name, lab: None, body, handlers } = &decl.item.kind else { return Ok(None) };
     let misplaced = |span: Span, headline: String, label: &str| {
         let d = Diagnostic::error(codes::MISPLACED, span, headline, label);
-        d.help(format!("steps of its own stand in `test {} in LAB {{ }}`", name.text))
+        d.help(format!("a test with its own steps starts with `test {} in LAB {{ }}`", name.text))
     };
     let mut stmts = body.stmts.iter().enumerate().filter(|(_, s)| !matches!(s.kind, StmtKind::Error));
     let Some((at, first)) = stmts.next() else {
-        let headline = format!("`{}` tests nothing", name.text);
+        let headline = format!("the test `{}` has no steps", name.text);
         let d = misplaced(name.span, headline, "no steps");
-        return Err(Box::new(d.help("begin with the workflow: `run NAME { parameter: value }`")));
+        return Err(Box::new(d.help("start with the workflow: `run NAME { parameter: value }`")));
     };
     let StmtKind::Run { workflow, options } = &first.kind else {
-        let d = misplaced(first.span, "a test begins with the workflow it runs".to_string(), "no `run WORKFLOW`");
+        let d =
+            misplaced(first.span, "a test must start with the workflow that it runs".to_string(), "no `run WORKFLOW`");
         return Err(Box::new(d));
     };
     for (_, stmt) in stmts {
         if !matches!(stmt.kind, StmtKind::Expect { .. } | StmtKind::Let { .. } | StmtKind::Note(_)) {
-            let headline = "after the run of its workflow a test only judges".to_string();
+            let headline = "after the run of its workflow a test can only `expect`".to_string();
             return Err(Box::new(misplaced(stmt.span, headline, "not an `expect`")));
         }
     }
     if handlers.finally.is_some() || !handlers.on.is_empty() {
-        let headline = "a test of a workflow handles no failures".to_string();
+        let headline = "a test of a workflow cannot have failure handlers".to_string();
         return Err(Box::new(misplaced(name.span, headline, "this test")));
     }
     let workflow = tables.names.find(decl.module, workflow, "workflow", |k| matches!(k, ItemKind::Workflow { .. }))?;

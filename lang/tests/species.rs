@@ -37,13 +37,16 @@ fn a_property_is_typed_where_it_is_written() {
         ("boiling_point: 97 kPa", &["unit-mismatch: `x.boiling_point` expects Temperature (K), found Pressure (Pa)"]),
         ("molar_mass: 2 * 29 g/mol", &["formula-invalid: the molar mass of `x` is 0.062068 kg/mol"]),
         ("density: 0 g/mL", &["out-of-range: `x.density` cannot be 0 g/mL"]),
-        ("density: 1 g/mL, heat_capacity: -1 J/(mol*K)", &["out-of-range: the heat capacity of `x` is not above zero"]),
+        (
+            "density: 1 g/mL, heat_capacity: -1 J/(mol*K)",
+            &["out-of-range: the heat capacity of `x` must be above zero"],
+        ),
         ("phase: \"liquit\"", &["type-mismatch: `x.phase` expects one of `solid`, `liquid`, `gas`, found a text"]),
         ("by: volume", &["type-mismatch: `by` is `mass`"]),
         ("fade: 3 s", &["unknown-field: a species has no field `fade`"]),
         (
             "density: 1 g/mL, molar_volume: 60 mL/mol",
-            &["out-of-range: `molar_volume` and `density` of `x` do not agree"],
+            &["out-of-range: `molar_volume` and `density` of `x` contradict each other"],
         ),
     ] {
         assert_eq!(one(fields), expected, "{fields}");

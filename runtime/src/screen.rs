@@ -299,7 +299,7 @@ impl<'p> Screen<'p> {
         let model = &self.program.model;
         let label = &self.program.plan.get(step).label;
         let alarm = |name: &str, mut found: Diagnostic| {
-            found.headline = format!("`{label}` is not carried out: {}", found.headline);
+            found.headline = format!("`{label}` was not carried out: {}", found.headline);
             Alarm { name: name.to_string(), found, around: self.around(Some(step)).collect() }
         };
         for (mixture, pairs) in &self.pairs {
@@ -324,7 +324,7 @@ impl<'p> Screen<'p> {
 
     fn danger(&self, danger: &Danger, step: Option<StepId>) -> Diagnostic {
         let span = self.place(step).unwrap_or(danger.span);
-        let mut found = Diagnostic::error(danger.code, span, danger.headline.clone(), "it came about here");
+        let mut found = Diagnostic::error(danger.code, span, danger.headline.clone(), "it happened here");
         found.severity = danger.severity;
         found.help.clone_from(&danger.help);
         found
@@ -340,10 +340,10 @@ impl<'p> Screen<'p> {
         let (name, span) = vessel.map_or(("?", self.program.plan.span()), |v| (v.name.as_str(), v.span));
         let headline = format!("`{a}` and `{b}` come together in `{name}`: {}", pair.words);
         let place = self.place(step).unwrap_or(span);
-        let mut d = Diagnostic::error(codes::INCOMPATIBLE_MIX, place, headline, "while this went on");
+        let mut d = Diagnostic::error(codes::INCOMPATIBLE_MIX, place, headline, "while this step ran");
         d.severity = pair.severity;
         d.help.extend(pair.help.iter().cloned());
-        d.help(format!("if this is meant, say so: `allow incompatible {a} with {b} \"why\"`"))
+        d.help(format!("if this is intended, write `allow incompatible {a} with {b} \"why\"`"))
     }
 }
 

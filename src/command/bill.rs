@@ -39,14 +39,14 @@ fn attempt(args: &BillArgs, color: Color) -> Result<Exit, String> {
     };
     print(Stream::Out, &text);
     if cancel.load(Ordering::SeqCst) && !billed.complete {
-        print_error("stopped before the run had ended; the bill above is of what had been done until then");
+        print_error("stopped before the end of the run; the bill above covers the steps until then");
     }
     Ok(if billed.complete { Exit::Fine } else { Exit::Findings })
 }
 
 fn prices(path: &Path) -> Result<Prices, String> {
     let bytes = files::read(path)?;
-    let text = String::from_utf8(bytes).map_err(|_| format!("`{}` is not text in UTF-8", path.display()))?;
+    let text = String::from_utf8(bytes).map_err(|_| format!("`{}` is not UTF-8 text", path.display()))?;
     Prices::read(&text).map_err(|e| format!("cannot read the prices in `{}`: {e}", path.display()))
 }
 

@@ -23,7 +23,7 @@ type Found = (Sources, Vec<Diagnostic>);
 /// Reports on every file that can be read; findings go to standard output.
 pub fn check(args: &CheckArgs, color: Color) -> Exit {
     if args.at.is_some() && args.files.len() > 1 {
-        print_error("a place is in one file: give one with `--at`");
+        print_error("`--at` needs exactly one file");
         return Exit::Usage;
     }
     if args.watch {
@@ -125,13 +125,13 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
     let path = path.display();
     match missed {
         _ if shown => Ok(out),
-        None => Err(format!("nothing is known of `{path}`: none of its workflows could be followed")),
+        None => Err(format!("`check` could not follow any workflow of `{path}`")),
         Some(At::NoLine(lines)) => Err(format!("`{path}` has {lines} lines")),
         Some(At::Nothing(before, after)) => {
             let near: Vec<String> = before.into_iter().chain(after).map(|l| l.to_string()).collect();
             let near =
                 if near.is_empty() { String::new() } else { format!("; the nearest are at {}", near.join(" and ")) };
-            Err(format!("there is no statement of a workflow at this place of `{path}`{near}"))
+            Err(format!("`{path}` has no statement of a workflow at this place{near}"))
         }
         Some(At::Statement(_)) => Ok(out),
     }

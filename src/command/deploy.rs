@@ -48,16 +48,16 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let (text, read) = Account::of(|| files::read(&args.subject.file));
     let input = Input::file(&args.subject.file, text?);
     let bindings = String::from_utf8(files::read(&args.bind)?)
-        .map_err(|_| format!("`{}` is not text in UTF-8", args.bind.display()))?;
+        .map_err(|_| format!("`{}` is not UTF-8 text", args.bind.display()))?;
     if args.mode != DeployMode::Dry && args.journal.is_none() && args.record.is_none() {
-        let how = "say where with `--journal FILE`, or with `--record FOLDER`";
-        return Err(format!("what is sent to devices is kept in a journal: {how}"));
+        let how = "add `--journal FILE` or `--record FOLDER`";
+        return Err(format!("a deployment needs a journal of the sent messages: {how}"));
     }
     if args.resume && args.mode == DeployMode::Dry {
-        return Err("a dry run has nothing to go on with".to_string());
+        return Err("a dry run cannot be resumed".to_string());
     }
     if args.view && args.mode == DeployMode::Dry {
-        return Err("a dry run is over before a page could show it: `--view` takes another `--mode`".to_string());
+        return Err("a dry run is too short for a page: use `--view` with another `--mode`".to_string());
     }
     let mut findings = Findings::new(RunFormat::Human, color);
     let measured = measured(args, &bindings);
@@ -104,7 +104,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let (board, panel) = panel(args, &program, &about)?;
     if mode != Mode::Dry && !args.resume && !stands(&measured) {
         findings.end();
-        print(Stream::Err, "what was measured is not confirmed: nothing was sent\n");
+        print(Stream::Err, "the calibration was not confirmed: nothing was sent\n");
         return Ok(Exit::Findings);
     }
     let record = recorded(args, &[read, imported], &bindings)?;
@@ -132,7 +132,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     cancel::last_words(left_exposed);
     if args.speed != 1.0 && mode != Mode::Dry {
         let speed = show_number(args.speed);
-        print(Stream::Err, &format!("lab time passes {speed} times as fast as the clock: for emulators only\n"));
+        print(Stream::Err, &format!("lab time runs {speed} times as fast as the clock: only for emulators\n"));
     }
     let deployed = pipeline::deploy(&program, &sources, plan);
     if let (Some(path), false) = (&args.journal, args.resume) {
@@ -156,7 +156,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     findings.show(&sources, deployed.diagnostics);
     findings.end();
     let stopped = match CONTROL.stopped_by().as_deref() {
-        Some(Answer::NOBODY) => "was stopped, as nobody was there to confirm (run it on a terminal, or with `--yes`),",
+        Some(Answer::NOBODY) => "was stopped because nobody could confirm (run it on a terminal, or with `--yes`),",
         _ => "was stopped by a person",
     };
     if let Some(end) = deployed.end {
@@ -169,7 +169,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         let seen = format!("{judged} expectations: {met} met, {unseen} not observed");
         print(Stream::Err, &format!("the deployment {how} after {} s; {seen}\n", show_number(end)));
     } else if deployed.stopped {
-        print(Stream::Err, &format!("the deployment {stopped}, before it began\n"));
+        print(Stream::Err, &format!("the deployment {stopped} before it started\n"));
     }
     // After the verdict: that stands whatever becomes of the record.
     let sealed = sealed.transpose().map_err(|why| format!("{why}; the record is not sealed"))?;
@@ -188,7 +188,7 @@ fn panel(args: &DeployArgs, program: &Program, about: &About) -> Result<(Arc<Boa
         return Ok((board, None));
     }
     let panel = Panel::open(Arc::clone(&board), &CONTROL, &EXPOSED, args.port)
-        .map_err(|e| format!("cannot serve the page at port {}: {}", args.port, files::reason(&e)))?;
+        .map_err(|e| format!("cannot serve the page on port {}: {}", args.port, files::reason(&e)))?;
     print(Stream::Err, &format!("the page of this deployment: {}\n", panel.url()));
     Ok((board, Some(panel)))
 }
@@ -283,7 +283,7 @@ fn stands(measured: &Calibration) -> bool {
     if all.is_empty() {
         return true;
     }
-    CONTROL.ask(BEFORE, &format!("measured, by `{}`:\n{}is that still so?", measured.name, all.concat()));
+    CONTROL.ask(BEFORE, &format!("calibration of `{}`:\n{}are these values still valid?", measured.name, all.concat()));
     while !CONTROL.is_stopped() {
         if let Some(answer) = CONTROL.answered(BEFORE) {
             return answer.yes;
@@ -297,8 +297,8 @@ fn stands(measured: &Calibration) -> bool {
 pub(super) fn left_exposed() -> String {
     let names = EXPOSED.names().iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
     match names.is_empty() {
-        true => "ended at once: no device was told anything that it was not made safe from\n".to_owned(),
-        false => format!("ended at once; not made safe: {names}: go and look now\n"),
+        true => "ended at once: every device that received a command was made safe\n".to_owned(),
+        false => format!("ended at once; not made safe: {names}: go and check now\n"),
     }
 }
 

@@ -14,7 +14,7 @@ pub fn discover(args: &DiscoverArgs) -> Exit {
     super::or_complain(look(Duration::from_secs_f64(args.time), None).map(|found| {
         found.iter().for_each(|server| print(Stream::Out, &shown(server)));
         if found.is_empty() {
-            print(Stream::Err, &format!("no server of SiLA 2 answers on the network within {} s\n", args.time));
+            print(Stream::Err, &format!("no SiLA 2 server answered on the network within {} s\n", args.time));
         }
         Exit::Fine
     }))

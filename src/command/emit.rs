@@ -34,7 +34,7 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     show(&sources, found, color);
     let Some(bytes) = written else {
         if cancel.load(Ordering::SeqCst) {
-            print_error("stopped before the workflow had been performed; nothing is written");
+            print_error("stopped before the end of the workflow; nothing is written");
         }
         return Ok(Exit::Findings);
     };

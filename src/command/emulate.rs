@@ -20,7 +20,7 @@ pub fn emulate(args: &EmulateArgs, color: Color) -> Exit {
 
 fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
     if args.link.is_some() && !args.pty {
-        return Err("`--link` is to a pseudo-terminal: it takes `--pty`".to_owned());
+        return Err("`--link` needs `--pty`".to_owned());
     }
     let named: Vec<(&str, Option<&str>)> = args
         .device
@@ -30,7 +30,7 @@ fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
     let (mut input, devices) = match (&args.file, named.as_slice()) {
         (Some(file), _) => (Input::file(file, files::read(file)?), named),
         (None, [(asset, address)]) => (Input::stdin(alone(asset)?.into_bytes()), vec![(ALONE, *address)]),
-        (None, _) => return Err("several devices are of a lab: give its file with `--file`".to_owned()),
+        (None, _) => return Err("several devices need a lab: give its file with `--file`".to_owned()),
     };
     let workflow = args.workflow.clone().or_else(|| input.idle());
     let options = Options { workflow, wires: Wires::Served, ..Options::default() };

@@ -30,7 +30,7 @@ pub fn explain(args: &ExplainArgs) -> Exit {
             Exit::Fine
         }
         Err(help) => {
-            print_error(&format!("there is no diagnostic code `{}`", args.code.as_deref().unwrap_or_default()));
+            print_error(&format!("unknown diagnostic code `{}`", args.code.as_deref().unwrap_or_default()));
             print(Stream::Err, &format!("help: {help}\n"));
             Exit::Usage
         }
@@ -47,8 +47,7 @@ fn own(name: &str, files: &[PathBuf]) -> Result<Exit, String> {
             found = true;
         }
     }
-    let nothing =
-        || format!("nothing in these files is called `{name}`: name a failure, a hazard or an `ends` of theirs");
+    let nothing = || format!("these files declare no `{name}`: name one of their failures, hazards or `ends`");
     found.then_some(Exit::Fine).ok_or_else(nothing)
 }
 
@@ -65,7 +64,7 @@ pub fn explanation(given: Option<&str>) -> Result<String, String> {
     }
     Err(match nearest(&name) {
         Some(code) => format!("did you mean `{code}`?"),
-        None => "`matterixc explain` lists all codes; a name that a file gives is explained with it, `matterixc explain NAME FILE`"
+        None => "`matterixc explain` lists all codes; for a name declared in a file use `matterixc explain NAME FILE`"
             .to_string(),
     })
 }

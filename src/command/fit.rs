@@ -40,7 +40,7 @@ fn attempt(args: &FitArgs, color: Color) -> Result<Exit, String> {
             Ok(if done.is_whole { Exit::Fine } else { Exit::Findings })
         }
         Ok(None) => {
-            print_error("stopped before anything was estimated");
+            print_error("stopped before the end of the fit");
             Ok(Exit::Findings)
         }
         Err(found) => {

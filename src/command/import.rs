@@ -83,7 +83,7 @@ fn summary(left_out: &[LeftOut], place: &str) -> Vec<String> {
             all.iter().take(MOST_NAMES).map(|l| format!("{} ({place} {})", l.name, l.line)).collect();
         let more = all.len().saturating_sub(MOST_NAMES);
         let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-        format!("left out, as {why}: {}{rest}", names.join(", "))
+        format!("not imported because {why}: {}{rest}", names.join(", "))
     };
     by_reason.iter().map(line).collect()
 }

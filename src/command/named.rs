@@ -13,12 +13,12 @@ struct Given {
     shown: &'static str,
 }
 
-const FAILURE: &str = "`check` reports it as `need-unmet`, with the name in the headline; in a run it is a failure, which `on NAME { }` takes.";
-const LATER: &str = "It may come in a run only: `on NAME { }` takes it.";
-const END: &str = "`check` reports it as `unfinished`; a run that ends so has missed an expectation.";
-const HAZARD: &str = "`check` reports it as `hazard`; in a run it is a failure, which `on NAME { }` takes. `allow NAME \"why\"` accepts it.";
+const FAILURE: &str = "`check` reports it as `need-unmet`; in a run it is a failure, which `on NAME { }` handles.";
+const LATER: &str = "It can happen only in a run; `on NAME { }` handles it.";
+const END: &str = "`check` reports it as `unfinished`; a run that ends like this counts as failed.";
+const HAZARD: &str = "`check` reports it as `hazard`; in a run it is a failure, which `on NAME { }` handles. `allow NAME \"why\"` accepts it.";
 const CAUTION: &str =
-    "`check` and a run report it as a warning, with the code `hazard`. `allow NAME \"why\"` accepts it.";
+    "`check` and `run` report it as a warning with the code `hazard`. `allow NAME \"why\"` accepts it.";
 
 /// What a text says of a name, in Markdown; nothing where it does not give it.
 pub fn named(name: &str, file: &str, text: &str) -> Option<String> {
@@ -27,7 +27,7 @@ pub fn named(name: &str, file: &str, text: &str) -> Option<String> {
     let given = given(&tree, &name);
     let mut shown: Vec<&str> = given.iter().map(|g| g.shown).collect();
     shown.dedup();
-    let mut out = format!("# {name}\n\n`{file}` gives this name. {}\n", shown.join(" ").replace("NAME", &name));
+    let mut out = format!("# {name}\n\n`{file}` declares this name. {}\n", shown.join(" ").replace("NAME", &name));
     for Given { within, span, .. } in &given {
         let line = text[..span.start as usize].matches('\n').count() + 1;
         let lines = text[span.start as usize..span.end as usize].lines().map(str::trim);
@@ -108,7 +108,7 @@ hazard hot(p: Heater) when p.target > 60 degC \"less\"
         for (name, parts) in [
             ("too_hard", ["Line 5, command `squeeze` of `Press`", "needs f <= 50 N else too_hard", "need-unmet"]),
             ("too-hard", ["# too_hard", "on too_hard { }", "squeeze with 50 N at most"]),
-            ("slips", ["Line 6", "fails slips", "in a run only"]),
+            ("slips", ["Line 6", "fails slips", "only in a run"]),
             ("cracks", ["a limit of `Press`", "keeps force <= 40 N", "need-unmet"]),
             ("left_pressed", ["an end of `Press`", "release it", "unfinished"]),
             ("hot", ["a hazard", "hazard hot(p: Heater)", "allow hot"]),

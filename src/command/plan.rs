@@ -47,7 +47,7 @@ fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
         files::write(path, &pipeline::picture(&schedule)?)?;
     }
     if is_cut {
-        print_error("stopped before the search had ended; the schedule above is the shortest found until then");
+        print_error("stopped before the end of the search; the schedule above is the shortest found so far");
         return Ok(Exit::Findings);
     }
     Ok(Exit::Fine)

@@ -46,16 +46,16 @@ pub fn play(
         .filter(|(driver, ..)| !driver.play.is_empty())
         .collect();
     let [(driver, place, at)] = players.as_slice() else {
-        let several = if players.is_empty() { "no device of these bindings" } else { "more than one device" };
-        return Err(format!("{several} has a driver that says how a file is played"));
+        let several = if players.is_empty() { "no device in these bindings" } else { "more than one device" };
+        return Err(format!("{several} has a driver that can run a file"));
     };
     let device = &program.scene.get(driver.instance).name;
     step_aside()?;
-    print(Stream::Err, &format!("`{device}` is given `{name}`, {} bytes\n", bytes.len()));
+    print(Stream::Err, &format!("sent `{name}` to `{device}`, {} bytes\n", bytes.len()));
     let sheet = Sheet { name: name.to_owned(), bytes };
     let broken = match played(&program, driver, place, sheet, cancel, &mut Silent) {
         Ok(()) => {
-            print(Stream::Err, &format!("`{device}` has run it to its end\n"));
+            print(Stream::Err, &format!("`{device}` has run the file\n"));
             return Ok(Exit::Fine);
         }
         Err(broken) => broken,
@@ -70,7 +70,7 @@ pub fn play(
     let trouble = match broken.why {
         Unplayed::Stopped => {
             show(&sources, left, color);
-            print(Stream::Err, "it was stopped\n");
+            print(Stream::Err, "the run was stopped\n");
             return Ok(Exit::Findings);
         }
         Unplayed::DeviceError(trouble) => trouble,
@@ -79,7 +79,7 @@ pub fn play(
         DeviceError::Refused { failure, text } => format!("{failure}: {text}"),
         other => other.text().to_owned(),
     };
-    let d = Diagnostic::error(trouble.code(), *at, format!("`{device}`: {why}"), "not run to its end");
+    let d = Diagnostic::error(trouble.code(), *at, format!("`{device}`: {why}"), "did not run to the end");
     show(&sources, std::iter::once(d).chain(left).collect(), color);
     Ok(Exit::Findings)
 }

@@ -25,12 +25,12 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     let bindings = match &args.bind {
         Some(path) => {
             let text = String::from_utf8(files::read(path)?);
-            Some((path, text.map_err(|_| format!("`{}` is not text in UTF-8", path.display()))?))
+            Some((path, text.map_err(|_| format!("`{}` is not UTF-8 text", path.display()))?))
         }
         None => None,
     };
     if bindings.is_some() && args.journal.is_none() {
-        return Err("what is sent to devices is kept in a journal: say where with `--journal FILE`".to_string());
+        return Err("serving devices needs a journal of the sent messages: add `--journal FILE`".to_string());
     }
     let mut findings = Findings::new(RunFormat::Human, color);
     let options = Options { workflow, wires: Wires::Offered, ..Options::default() };
@@ -43,9 +43,9 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     };
     matterix_hardware::serve::wait_for_ever(&mut program);
     let place = (args.host.as_str(), args.tcp).to_socket_addrs().ok().and_then(|mut all| all.next());
-    let address: SocketAddr = place.ok_or_else(|| format!("there is no host `{}`", args.host))?;
+    let address: SocketAddr = place.ok_or_else(|| format!("unknown host `{}`", args.host))?;
     // Before anything is made for it: a certificate is for the address.
-    drop(TcpListener::bind(address).map_err(|e| format!("`{address}` cannot be listened at: {e}"))?);
+    drop(TcpListener::bind(address).map_err(|e| format!("cannot listen on `{address}`: {e}"))?);
     let file =
         bindings.as_ref().map(|(path, text)| (sources.add(path.display().to_string(), text.clone()), text.as_str()));
     let mut ready = |address: SocketAddr, catalogue: &matterix_hardware::serve::Catalogue<'_>| {
@@ -65,7 +65,7 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     cancel::last_words(super::deploy::left_exposed);
     cancel::on_interrupt_quietly()?;
     let uuid = match &args.uuid {
-        Some(given) => matterix_sila_wire::uuid(given).ok_or_else(|| format!("`{given}` is no UUID"))?,
+        Some(given) => matterix_sila_wire::uuid(given).ok_or_else(|| format!("`{given}` is not a UUID"))?,
         None => crate::identity::of(&args.file, &program.scene.lab)?,
     };
     let door = door(args, address, &uuid)?;
@@ -97,7 +97,7 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
 fn door(args: &ServeArgs, address: SocketAddr, uuid: &str) -> Result<Door, String> {
     let text = |path: &Path| {
         let text = String::from_utf8(files::read(path)?);
-        text.map_err(|_| format!("`{}` is not text in UTF-8", path.display()))
+        text.map_err(|_| format!("`{}` is not UTF-8 text", path.display()))
     };
     let users = args
         .users

@@ -37,7 +37,7 @@ fn attempt(args: &StudyArgs, color: Color) -> Result<Exit, String> {
         done.write(dir)?;
     }
     if !done.is_whole {
-        print_error("stopped before all runs had ended; what is said above is of those that had");
+        print_error("stopped before all runs had ended; the figures above cover the finished runs");
         return Ok(Exit::Findings);
     }
     Ok(Exit::Fine)

@@ -30,11 +30,10 @@ fn attempt(args: &SubstanceArgs) -> Result<Exit, String> {
     let word = args.name.trim();
     let found = catalogue.find(word);
     let Some((first, others)) = found.split_first() else {
-        print_error(&format!("there is no substance `{word}`"));
+        print_error(&format!("unknown substance `{word}`"));
         let near: Vec<String> = catalogue.near(word).iter().map(|name| format!("`{name}`")).collect();
         let help = match near.as_slice() {
-            [] => "give a name, a formula, a CAS number or a SMILES; `--file` also looks in a file of your own"
-                .to_string(),
+            [] => "give a name, a formula, a CAS number or a SMILES; `--file` also searches your own file".to_string(),
             all => format!("did you mean {}?", joined(all, "or")),
         };
         print(Stream::Err, &format!("help: {help}\n"));
@@ -96,7 +95,7 @@ fn page(s: &Substance) -> String {
     }
     let there = match &s.import {
         Some(import) => format!("`{import}`, or `{import}::{}`", s.name),
-        None if s.module.starts_with("std::") => format!("nothing: every file sees {}", s.module),
+        None if s.module.starts_with("std::") => format!("no import needed: every file sees {}", s.module),
         None => format!("declared in {}", s.module),
     };
     line("to use it", &there);

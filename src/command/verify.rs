@@ -18,7 +18,7 @@ fn attempt(args: &VerifyArgs) -> Result<Exit, String> {
     }
     if args.recording.join(record::JOURNAL).is_file() {
         let folder = args.recording.display();
-        return Err(format!("the record in `{folder}` was not sealed: it has a journal and no `{}`", record::MANIFEST));
+        return Err(format!("the record in `{folder}` is not sealed: it has a journal but no `{}`", record::MANIFEST));
     }
     let file = if args.recording.is_dir() { &args.recording.join("recording.mcap") } else { &args.recording };
     let verdict = matterix_judge::judge(&files::read_recording(file)?)
@@ -62,7 +62,7 @@ fn page(verdict: &Verdict) -> String {
     }
     let count = verdict.wrong.len();
     out + &match (verdict.looked.len(), count) {
-        (0, _) => "no robot to judge\n".to_string(),
+        (0, _) => "no robot motions to judge\n".to_string(),
         (_, 0) => "nothing wrong\n".to_string(),
         (_, 1) => "1 thing wrong\n".to_string(),
         _ => format!("{count} things wrong\n"),

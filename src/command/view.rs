@@ -23,7 +23,7 @@ fn attempt(args: &ViewArgs, color: Color) -> Result<Exit, String> {
         files::write(path, &page)?;
         return Ok(Exit::Fine);
     }
-    let failed = |e: std::io::Error| format!("cannot serve the page at port {}: {}", args.port, files::reason(&e));
+    let failed = |e: std::io::Error| format!("cannot serve the page on port {}: {}", args.port, files::reason(&e));
     let mut served = serve::Served::new(page, args.port).map_err(failed)?;
     let stop = cancel::on_interrupt_quietly()?;
     print(Stream::Out, &format!("{}\n", served.url()));
@@ -40,13 +40,13 @@ fn document(args: &ViewArgs, color: Color) -> Result<Option<Document>, String> {
     if from_recording::is_recording(&bytes) {
         let subject = &args.subject;
         if subject.workflow.is_some() || subject.lab.is_some() || !subject.set.is_empty() {
-            return Err("a recording is of one workflow in one lab: leave out --workflow, --lab and --set".to_string());
+            return Err("a recording has one workflow in one lab: remove --workflow, --lab and --set".to_string());
         }
         let read = from_recording::from_recording(&bytes);
         return read.map(Some).map_err(|e| format!("cannot show `{}`: {e}", file.display()));
     }
     if file.extension().is_some_and(|e| e == "mcap") {
-        return Err(format!("cannot show `{}`: it is no recording", file.display()));
+        return Err(format!("cannot show `{}`: it is not a recording", file.display()));
     }
     let input = Input::file(file, bytes);
     let (sources, program, found) = pipeline::compile(&input, &args.subject.options());

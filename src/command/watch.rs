@@ -27,10 +27,10 @@ type Changes = Receiver<notify::Result<Event>>;
 pub(super) fn watch(files: &[PathBuf], look: impl Fn(&[PathBuf]) -> (String, Exit)) -> Result<Exit, String> {
     let stop = cancel::on_interrupt_quietly()?;
     let (told, changes) = mpsc::channel();
-    let mut watcher = notify::recommended_watcher(told).map_err(|e| format!("files cannot be watched: {e}"))?;
+    let mut watcher = notify::recommended_watcher(told).map_err(|e| format!("cannot watch files: {e}"))?;
     for folder in folders(files) {
         let watched = watcher.watch(&folder, RecursiveMode::Recursive);
-        watched.map_err(|e| format!("`{}` cannot be watched: {e}", folder.display()))?;
+        watched.map_err(|e| format!("cannot watch `{}`: {e}", folder.display()))?;
     }
     let mut first = true;
     loop {
@@ -71,8 +71,8 @@ fn folders(files: &[PathBuf]) -> BTreeSet<PathBuf> {
 fn changed(changes: &Changes, read: &Account, within: Duration) -> Result<bool, String> {
     match changes.recv_timeout(within) {
         Ok(Ok(event)) => Ok(!event.kind.is_access() && event.paths.iter().any(|path| read.may_name(path))),
-        Ok(Err(e)) => Err(format!("files cannot be watched any more: {e}")),
+        Ok(Err(e)) => Err(format!("stopped watching files: {e}")),
         Err(RecvTimeoutError::Timeout) => Ok(false),
-        Err(RecvTimeoutError::Disconnected) => Err("files cannot be watched any more".to_owned()),
+        Err(RecvTimeoutError::Disconnected) => Err("stopped watching files".to_owned()),
     }
 }

@@ -27,13 +27,13 @@ pub fn read(stream: &mut impl BufRead) -> Option<Frame> {
     };
     if length > LONGEST {
         io::copy(&mut stream.take(length), &mut io::sink()).ok()?;
-        return Some(Frame::Broken(format!("a message of {length} bytes is not read: at most {LONGEST} are")));
+        return Some(Frame::Broken(format!("a message of {length} bytes is too long: the limit is {LONGEST}")));
     }
     let mut bytes = Vec::new();
     stream.take(length).read_to_end(&mut bytes).ok().filter(|read| *read as u64 == length)?;
     Some(match serde_json::from_slice(&bytes) {
         Ok(message) => Frame::Message(message),
-        Err(why) => Frame::Broken(format!("what came is no message: {why}")),
+        Err(why) => Frame::Broken(format!("invalid message: {why}")),
     })
 }
 
@@ -61,11 +61,11 @@ fn header(stream: &mut impl BufRead) -> Option<Result<u64, String>> {
             Some((name, value)) if name.trim().eq_ignore_ascii_case("content-length") => {
                 match value.trim().parse() {
                     Ok(bytes) => length = Some(bytes),
-                    Err(_) => return Some(Err(format!("`{}` is no length", value.trim()))),
+                    Err(_) => return Some(Err(format!("`{}` is not a length", value.trim()))),
                 };
             }
             Some(_) => {}
-            None => return Some(Err("a line that is no header of a message".to_string())),
+            None => return Some(Err("a line that is not a header of a message".to_string())),
         }
     }
 }

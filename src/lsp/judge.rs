@@ -213,13 +213,13 @@ impl Loader for Texts<'_> {
     }
 
     fn bytes(&self, from: FileId, path: &str) -> Result<Vec<u8>, String> {
-        let Some(folder) = self.folder else { return Err("the text that names it is not saved".to_string()) };
+        let Some(folder) = self.folder else { return Err("a file that uses this name is not saved".to_string()) };
         self.note(&folder.join(path));
         self.neighbours.bytes(from, path)
     }
 
     fn file(&self, from: FileId, path: &str) -> Result<String, String> {
-        let Some(folder) = self.folder else { return Err("the text that names it is not saved".to_string()) };
+        let Some(folder) = self.folder else { return Err("a file that uses this name is not saved".to_string()) };
         self.note(&folder.join(path));
         self.neighbours.file(from, path)
     }

@@ -207,14 +207,16 @@ impl Server {
     fn answer(&mut self, request: Request) {
         match (self.stage, request.method.as_str()) {
             (Stage::Strange, asked::Initialize::METHOD) => self.begin(request),
-            (Stage::Strange, _) => self.refuse(request.id, ErrorCode::ServerNotInitialized, "nothing was agreed yet"),
+            (Stage::Strange, _) => {
+                self.refuse(request.id, ErrorCode::ServerNotInitialized, "the session is not initialised yet")
+            }
             (Stage::Open, asked::Shutdown::METHOD) => {
                 self.stage = Stage::Ending;
                 self.held.ready(|_| true).into_iter().for_each(|held| self.give(held));
                 self.send(Response::new_ok(request.id, ()));
             }
             (Stage::Open, asked::Initialize::METHOD) | (Stage::Ending, _) => {
-                self.refuse(request.id, ErrorCode::InvalidRequest, "this is not the time for it");
+                self.refuse(request.id, ErrorCode::InvalidRequest, "not allowed at this time");
             }
             (Stage::Open, _) => match Held::about(&request).filter(|uri| self.is_unchecked(uri)) {
                 Some(uri) => self.held.keep(uri, request),
@@ -276,7 +278,7 @@ impl Server {
                     self.urgent = Some(document.uri.as_str().to_string());
                     // Places that were asked about are those of the text before.
                     for id in self.held.of(&document.uri) {
-                        self.refuse(id, ErrorCode::ContentModified, "the text has changed since");
+                        self.refuse(id, ErrorCode::ContentModified, "the document has changed since");
                     }
                     self.documents.edit(&document.uri, document.version, params.content_changes);
                 }
@@ -319,7 +321,7 @@ impl Server {
         match serde_json::from_value(note.params) {
             Ok(params) => Some(params),
             Err(why) => {
-                self.log(MessageType::WARNING, &format!("`{}` cannot be read: {why}", N::METHOD));
+                self.log(MessageType::WARNING, &format!("cannot read `{}`: {why}", N::METHOD));
                 None
             }
         }

@@ -44,7 +44,7 @@ pub fn bounded(text: String, bytes: usize) -> String {
     }
     let head = beginning(&text, bytes);
     let head = head.rfind('\n').map_or(head, |line| &head[..=line]);
-    format!("{head}... {} bytes more are left out\n", text.len() - head.len())
+    format!("{head}... {} more bytes are not shown\n", text.len() - head.len())
 }
 
 /// The beginning of a text, of at most so many bytes.
@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn a_text_is_cut_at_the_end_of_a_line_or_of_a_character() {
         assert_eq!(bounded("short\n".to_string(), 10), "short\n");
-        assert_eq!(bounded("one\ntwo\nthree\n".to_string(), 10), "one\ntwo\n... 6 bytes more are left out\n");
-        assert_eq!(bounded("µµµ".to_string(), 3), "µ... 4 bytes more are left out\n");
+        assert_eq!(bounded("one\ntwo\nthree\n".to_string(), 10), "one\ntwo\n... 6 more bytes are not shown\n");
+        assert_eq!(bounded("µµµ".to_string(), 3), "µ... 4 more bytes are not shown\n");
     }
 
     #[test]

@@ -29,7 +29,7 @@ impl Desk {
 
     /// A file of the folder by its path from there, links followed.
     pub fn place(&self, path: &str) -> Result<PathBuf, String> {
-        let outside = || format!("`{path}` is not in the folder of the server; paths are given from there");
+        let outside = || format!("`{path}` is outside the folder of the server; paths are relative to it");
         let asked = self.root.join(path);
         // Whether something is there is not told of what is elsewhere.
         if !files::lies_in(&asked, &self.root) {

@@ -71,7 +71,7 @@ pub fn told(sources: &Sources, found: &[Named]) -> (Findings, String) {
     let offers: String =
         found.iter().take(MOST).flat_map(|n| n.diagnostic.fixes.iter().zip(&n.ids)).map(offer).collect();
     if !offers.is_empty() {
-        text += &format!("corrections that `fix` can make:\n{offers}");
+        text += &format!("fixes that `fix` can apply:\n{offers}");
     }
     let tally = reporter.tally();
     let findings = found.iter().take(MOST).map(|n| object(n, sources)).collect();

@@ -36,9 +36,9 @@ pub fn serve(root: &Path) -> Result<(), String> {
             Ok(running) => running,
             // Nothing was asked, so nothing is wrong.
             Err(ServerInitializeError::ConnectionClosed(_)) => return Ok(()),
-            Err(e) => return Err(failed("the client did not begin a session", &e)),
+            Err(e) => return Err(failed("the client did not start a session", &e)),
         };
-        running.waiting().await.map(drop).map_err(|e| failed("the session broke off", &e))
+        running.waiting().await.map(drop).map_err(|e| failed("the session was interrupted", &e))
     });
     // Work that nobody waits for any more does not hold up the end.
     runtime.shutdown_background();

@@ -17,17 +17,17 @@ const STARTS: &[Start] = &[
     Start {
         name: "write-protocol",
         title: "Write a protocol",
-        about: "Write a protocol from a description, until it has no findings and its expectations hold",
+        about: "Write a protocol from a description, until it has no findings and its expectations are met",
         gap: "task",
-        gap_about: "what the protocol is to do: substances, amounts, vessels, devices, what is to come out",
+        gap_about: "the task of the protocol: substances, amounts, vessels, devices, the expected result",
         text: include_str!("texts/write.md"),
     },
     Start {
         name: "repair-protocol",
         title: "Repair a protocol",
-        about: "Mend a protocol until it has no findings, without changing what it is meant to do",
+        about: "Repair a protocol until it has no findings, without changing its purpose",
         gap: "path",
-        gap_about: "the file, from the folder of the server",
+        gap_about: "the file, relative to the folder of the server",
         text: include_str!("texts/repair.md"),
     },
 ];
@@ -45,10 +45,10 @@ pub fn all() -> Vec<Prompt> {
 pub fn get(name: &str, given: &JsonObject) -> Result<GetPromptResult, String> {
     let Some(start) = STARTS.iter().find(|s| s.name == name) else {
         let names: Vec<&str> = STARTS.iter().map(|s| s.name).collect();
-        return Err(format!("there is no prompt `{name}`; there are {}", names.join(", ")));
+        return Err(format!("unknown prompt `{name}`; use {}", names.join(", ")));
     };
     let Some(filled) = given.get(start.gap).and_then(Value::as_str).filter(|t| !t.trim().is_empty()) else {
-        return Err(format!("`{name}` wants `{}`: {}", start.gap, start.gap_about));
+        return Err(format!("`{name}` needs `{}`: {}", start.gap, start.gap_about));
     };
     let text = start.text.replace(&format!("{{{}}}", start.gap), filled);
     Ok(GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]).with_description(start.about))

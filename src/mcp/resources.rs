@@ -37,7 +37,7 @@ const PAGES: &[Page] = &[
     Page {
         uri: "mtx://library",
         title: "The standard library",
-        about: "What each module of the standard library has, in tables",
+        about: "The contents of each module of the standard library, in tables",
         mime: MARKDOWN,
         text: include_str!("../../docs/library.md"),
     },
@@ -51,14 +51,14 @@ const PAGES: &[Page] = &[
     Page {
         uri: "mtx://checks",
         title: "The checks",
-        about: "What is looked for before a run, by families of checks",
+        about: "The checks before a run, by family",
         mime: MARKDOWN,
         text: include_str!("../../docs/checks.md"),
     },
     Page {
         uri: "mtx://findings",
         title: "Findings as JSON",
-        about: "The form of the findings that check, fix and run answer with",
+        about: "The format of the findings in the answers of check, fix and run",
         mime: MARKDOWN,
         text: include_str!("../../docs/diagnostics-json.md"),
     },
@@ -71,22 +71,22 @@ const PAGES: &[Page] = &[
     },
     Page {
         uri: "mtx://contents",
-        title: "What is known at every statement",
-        about: "The form of what contents answers with, and what holds",
+        title: "The known state at every statement",
+        about: "The format of the answers of contents, and its guarantees",
         mime: MARKDOWN,
         text: include_str!("../../docs/contents.md"),
     },
     Page {
         uri: "mtx://report",
         title: "The report of a run",
-        about: "The members of the report that run answers with",
+        about: "The members of the report in the answers of run",
         mime: MARKDOWN,
         text: include_str!("../../docs/report.md"),
     },
     Page {
         uri: "mtx://schedule",
         title: "Schedules",
-        about: "The form of the schedule that plan answers with",
+        about: "The format of the schedule in the answers of plan",
         mime: MARKDOWN,
         text: include_str!("../../docs/schedule.md"),
     },
@@ -108,7 +108,7 @@ pub fn all() -> Vec<Resource> {
     });
     let codes = Resource::new(CODES, "codes")
         .with_title("The codes of findings")
-        .with_description("All codes by family, a line each")
+        .with_description("All codes by family, one line for each")
         .with_mime_type(PLAIN);
     pages.chain([codes]).collect()
 }
@@ -118,7 +118,7 @@ pub fn templates() -> Vec<ResourceTemplate> {
     vec![
         ResourceTemplate::new(format!("{CODES}/{{code}}"), "code")
             .with_title("A code")
-            .with_description("What a code such as `unit-mismatch` means, with an example and the same mended")
+            .with_description("The meaning of a code such as `unit-mismatch`, with an example and its fixed version")
             .with_mime_type(MARKDOWN),
         ResourceTemplate::new(format!("{MODULES}{{module}}"), "module")
             .with_title("A module of the standard library")

@@ -58,7 +58,7 @@ impl ServerHandler for Server {
     ) -> Result<CallToolResponse, ErrorData> {
         let Some(offer) = self.offers.iter().find(|o| o.tool.name == call.name) else {
             let names: Vec<&str> = self.offers.iter().map(|o| o.tool.name.as_ref()).collect();
-            let why = format!("there is no tool `{}`; there are {}", call.name, names.join(", "));
+            let why = format!("unknown tool `{}`; use {}", call.name, names.join(", "));
             return Err(ErrorData::invalid_params(why, None));
         };
         let answer = match (offer.order)(call.arguments.unwrap_or_default()) {
@@ -89,7 +89,7 @@ impl ServerHandler for Server {
         asked: ReadResourceRequestParams,
         _: RequestContext<RoleServer>,
     ) -> Result<ReadResourceResponse, ErrorData> {
-        let missing = || ErrorData::resource_not_found(format!("there is no resource `{}`", asked.uri), None);
+        let missing = || ErrorData::resource_not_found(format!("unknown resource `{}`", asked.uri), None);
         resources::read(&asked.uri).map(ReadResourceResponse::from).ok_or_else(missing)
     }
 

@@ -43,7 +43,7 @@ impl Shop {
         wanted: impl Future<Output = ()>,
     ) -> Result<Answer, String> {
         let Ok(_place) = self.places.try_acquire() else {
-            return Err(format!("{MOST} calls are worked on or wait already: ask again when one of them has ended"));
+            return Err(format!("{MOST} calls are already running or waiting: call again when one of them has ended"));
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (shop, flag) = (self.clone(), stop.clone());
@@ -68,13 +68,13 @@ impl Shop {
         stop.store(true, Ordering::SeqCst);
         tokio::select! {
             answer = &mut done => answer,
-            () = sleep(GRACE) => Err(format!("this takes longer than {} s; give a smaller protocol or more `seconds`", limit.as_secs())),
+            () = sleep(GRACE) => Err(format!("this takes longer than {} s; use a smaller protocol or more `seconds`", limit.as_secs())),
         }
     }
 }
 
 async fn ended(job: JoinHandle<Result<Answer, String>>) -> Result<Answer, String> {
     job.await.unwrap_or_else(|_| {
-        Err("this call met a fault of the compiler; please report the text that shows it".to_string())
+        Err("this call hit a bug in the compiler; please report the text that shows it".to_string())
     })
 }

@@ -39,23 +39,23 @@ enum What {
 pub(super) fn answer(request: &Request, control: &Control) -> Answer {
     let is_json = request.header("Content-Type").is_some_and(|kind| kind.starts_with("application/json"));
     if !is_json {
-        return Answer::text(400, "say it in JSON (`Content-Type: application/json`)");
+        return Answer::text(400, "send JSON (`Content-Type: application/json`)");
     }
     let act: Act = match serde_json::from_slice(&request.body) {
         Ok(act) => act,
         Err(_) => {
-            return Answer::text(422, r#"say `{"who": "NAME", "do": "pause"}`: pause, step, go, stop, yes or no"#);
+            return Answer::text(422, r#"send `{"who": "NAME", "do": "pause"}`: pause, step, go, stop, yes or no"#);
         }
     };
     let name = act.who.trim();
     if name.is_empty() || name.chars().count() > LONGEST_NAME || name.chars().any(char::is_control) {
-        return Answer::text(422, "say who you are: a name of 1 to 80 characters");
+        return Answer::text(422, "enter your name: 1 to 80 characters");
     }
     let who = format!("{}, on the page", visible(name));
     let (gate, what) = match act.what {
         What::Pause => (Some(Gate::Pause), "pause"),
         What::Step => (Some(Gate::Step), "one step"),
-        What::Go => (Some(Gate::Go), "go on"),
+        What::Go => (Some(Gate::Go), "continue"),
         What::Stop => (None, "stop"),
         What::Yes | What::No => return reply(&act, who, control),
     };
@@ -70,11 +70,11 @@ pub(super) fn answer(request: &Request, control: &Control) -> Answer {
 /// Answers a question.
 fn reply(act: &Act, who: String, control: &Control) -> Answer {
     let Some(question) = act.question.as_ref().and_then(|number| number.parse().ok()) else {
-        return Answer::text(422, "say which question: `\"question\": \"3\"`");
+        return Answer::text(422, "name the question: `\"question\": \"3\"`");
     };
     let yes = act.what == What::Yes;
     if !control.answer(question, Said { yes, who }) {
-        return Answer::text(409, "that question is not open any more: somebody has answered it, or it was withdrawn");
+        return Answer::text(409, "this question is no longer open: it was answered or withdrawn");
     }
     Answer::text(202, "heard")
 }

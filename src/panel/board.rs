@@ -234,23 +234,23 @@ impl State {
 /// A line of the journal in words, where it has something to say to people.
 fn line(entry: &Entry) -> Option<(Kind, String)> {
     let (kind, text) = match entry {
-        Entry::Begin { who, .. } => (Kind::Person, format!("begun by {who}")),
-        Entry::Resumed { who, .. } => (Kind::Person, format!("gone on with by {who}")),
+        Entry::Begin { who, .. } => (Kind::Person, format!("started by {who}")),
+        Entry::Resumed { who, .. } => (Kind::Person, format!("resumed by {who}")),
         Entry::Starting { label, device, .. } => (Kind::Plain, format!("{device}: {label}")),
         Entry::Ended { failed: Some((name, text)), .. } => (Kind::Wrong, format!("{name}: {text}")),
-        Entry::Again { device, why, .. } => (Kind::Wrong, format!("{device}: asked again, as {why}")),
+        Entry::Again { device, why, .. } => (Kind::Wrong, format!("{device}: asked again because {why}")),
         Entry::Asked { text, .. } => (Kind::Person, format!("asked: {text}")),
         Entry::Answered { yes: true, who, .. } => (Kind::Person, format!("confirmed by {who}")),
         Entry::Answered { yes: false, who, .. } => (Kind::Person, format!("not confirmed by {who}")),
         Entry::Gate { to: Gate::Pause, who, .. } => (Kind::Person, format!("paused by {who}")),
         Entry::Gate { to: Gate::Step, who, .. } => (Kind::Person, format!("one step, by {who}")),
-        Entry::Gate { to: Gate::Go, who, .. } => (Kind::Person, format!("going on, by {who}")),
+        Entry::Gate { to: Gate::Go, who, .. } => (Kind::Person, format!("continued by {who}")),
         Entry::Stop { who, .. } => (Kind::Person, format!("stopped by {who}")),
-        Entry::HeldUp { seconds, .. } => (Kind::Wrong, format!("the deployment stood still for {seconds:.1} s")),
+        Entry::HeldUp { seconds, .. } => (Kind::Wrong, format!("the deployment was paused for {seconds:.1} s")),
         Entry::Fault { text, .. } => (Kind::Wrong, text.clone()),
         Entry::Safe { device, trouble: None, .. } => (Kind::Plain, format!("{device}: made safe")),
         Entry::Safe { device, trouble: Some(why), .. } => {
-            (Kind::Wrong, format!("{device}: could not be made safe: {why}: go and look now"))
+            (Kind::Wrong, format!("{device}: could not be made safe: {why}: go and check now"))
         }
         Entry::End { status, .. } => (Kind::Person, format!("the end: {status}")),
         _ => return None,

@@ -127,10 +127,10 @@ impl Desk {
     /// Why a request is not served, if it is not.
     fn refusal(&self, request: &Request) -> Option<Answer> {
         match () {
-            () if !request.is_for_this_machine() => Some(Answer::text(403, "this page is for this machine only")),
-            () if !request.is_of_own_origin() => Some(Answer::text(403, "a page of another origin may not ask")),
+            () if !request.is_for_this_machine() => Some(Answer::text(403, "this page is for this computer only")),
+            () if !request.is_of_own_origin() => Some(Answer::text(403, "requests from other origins are not allowed")),
             () if !self.token.is_known_to(request) => {
-                Some(Answer::text(401, "open the address that `deploy --view` printed, with its token"))
+                Some(Answer::text(401, "open the address printed by `deploy --view`, with its token"))
             }
             () => None,
         }
@@ -146,9 +146,9 @@ impl Desk {
                 .with("Referrer-Policy", "no-referrer"),
             ("GET", "/state") => Answer::new(200, "application/json", self.state().into_bytes()),
             ("POST", "/act") => act::answer(request, self.control),
-            (_, "/" | "/state" | "/events") => Answer::text(405, "this is only read").with("Allow", "GET"),
-            (_, "/act") => Answer::text(405, "this is only told").with("Allow", "POST"),
-            _ => Answer::text(404, "there is no such page"),
+            (_, "/" | "/state" | "/events") => Answer::text(405, "this address only takes GET").with("Allow", "GET"),
+            (_, "/act") => Answer::text(405, "this address only takes POST").with("Allow", "POST"),
+            _ => Answer::text(404, "page not found"),
         }
     }
 }

@@ -37,10 +37,10 @@ pub fn emulate(
     for (device, address) in devices {
         units.push((drivers_of(program, device, driver)?, *address));
     }
-    let chosen = units.first().and_then(|(drivers, _)| drivers.first()).copied().ok_or("no device is named")?;
+    let chosen = units.first().and_then(|(drivers, _)| drivers.first()).copied().ok_or("name a device")?;
     if let Transport::Sila { .. } = chosen.transport {
-        let why = "what a driver over `sila` speaks to is a server, not a line";
-        return Err(format!("{why}: `matterixc serve` offers a lab as one"));
+        let why = "a driver over `sila` needs a server, not a line";
+        return Err(format!("{why}: use `matterixc serve`"));
     }
     together(&units)?;
     let prepared = Prepared::new(program);
@@ -48,14 +48,14 @@ pub fn emulate(
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
     let engine = engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)).map_err(|f| f.message)?;
     let mut units = units.into_iter();
-    let (first, address) = units.next().ok_or("no device is named")?;
+    let (first, address) = units.next().ok_or("name a device")?;
     let mut emulator = Emulator::new(Sim::new(engine, &prepared, seed), first, address)?;
     units.try_for_each(|(drivers, address)| emulator.join(drivers, address))?;
     emulator.heeded(|why| print(Stream::Err, &format!("{why}\n")));
     let stop = Stop { cancel, speed };
     if let Transport::Http { header } = &chosen.transport {
         let Line::Tcp(port) = line else {
-            return Err(format!("`{}` speaks over HTTP: say at which port with `--tcp`", chosen.name));
+            return Err(format!("`{}` uses HTTP: give its port with `--tcp`", chosen.name));
         };
         return serve_http(&mut emulator, *port, header.as_ref(), stop, ready);
     }
@@ -73,8 +73,8 @@ fn drivers_of<'p>(program: &'p Program, device: &str, driver: Option<&str>) -> R
     let chosen = match (driver, all.as_slice()) {
         (Some(name), _) => all.iter().find(|d| d.name == name).copied(),
         (None, [only]) => Some(*only),
-        (None, []) => return Err(format!("no driver says how `{device}` is spoken to")),
-        (None, _) => return Err(format!("`{device}` has several drivers: say which with `--driver`: {list}")),
+        (None, []) => return Err(format!("`{device}` has no driver")),
+        (None, _) => return Err(format!("`{device}` has several drivers: choose one with `--driver`: {list}")),
     };
     let chosen = chosen.ok_or_else(|| format!("`{device}` has no such driver: it has {list}"))?;
     let is_its = |d: &&Driver| d.host.as_ref().is_some_and(|h| h.instance == instance && h.driver == chosen.name);
@@ -89,7 +89,7 @@ fn together(units: &[(Vec<&Driver>, Option<&str>)]) -> Result<(), String> {
     for (at, unit) in units.iter().enumerate().skip(1) {
         let own = address(unit);
         if own.is_none() || units[..at].iter().any(|other| address(other) == own) {
-            return Err("devices at one line have an address each, as in `pump@2`".to_owned());
+            return Err("devices on one line need an address each, as in `pump@2`".to_owned());
         }
     }
     Ok(())

@@ -67,7 +67,10 @@ pub fn study(
     let points = Design::grid(study);
     let runs = asked.runs.or(study.runs).or(points).unwrap_or(1);
     if let Some(points) = points.filter(|points| !runs.is_multiple_of(*points)) {
-        return Err(format!("the grids of `{}` have {points} points: the runs must be a multiple of that", study.name));
+        return Err(format!(
+            "the grids of `{}` have {points} points: the number of runs must be a multiple of this",
+            study.name
+        ));
     }
     let options = study::Options { runs, seed: asked.seed, jobs: asked.jobs, cancel: asked.cancel };
     let rows = study::runs(program, study, &options, &mut |n| done(n, runs));
@@ -89,7 +92,7 @@ pub fn fit(
         Ok(outcome) => outcome,
         Err(Unsolved::Cancelled) => return Ok(Ok(None)),
         Err(Unsolved::Failed(why)) => {
-            let headline = format!("nowhere in its ranges does this fit come to its data: {why}");
+            let headline = format!("the fit failed everywhere in its ranges: {why}");
             return Ok(Err(Box::new(Diagnostic::error(codes::RUN_FAILED, fit.span, headline, "this fit"))));
         }
     };

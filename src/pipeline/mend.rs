@@ -60,7 +60,7 @@ pub fn mend(mut input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Stor
 /// The text of a file after these corrections of one check, and each with its place; `Err` says in words why they cannot
 /// all be made.
 pub fn correct(input: Input, sources: &Sources, fixes: &[&Fix]) -> Result<(Input, Vec<Mended>), String> {
-    let text = std::str::from_utf8(&input.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;
+    let text = std::str::from_utf8(&input.bytes).map_err(|_| "the file is not UTF-8 text".to_string())?;
     let mut taken: Vec<Span> = Vec::new();
     for fix in fixes {
         for edit in &fix.edits {
@@ -68,10 +68,7 @@ pub fn correct(input: Input, sources: &Sources, fixes: &[&Fix]) -> Result<(Input
                 return Err(format!("`{}` changes another file", fix.title));
             }
             if !taken.iter().all(|t| apart(*t, edit.span)) {
-                return Err(format!(
-                    "`{}` changes what another of the corrections changes; make one after the other",
-                    fix.title
-                ));
+                return Err(format!("`{}` overlaps another fix; apply them one after the other", fix.title));
             }
         }
         taken.extend(fix.edits.iter().map(|e| e.span));

@@ -114,9 +114,9 @@ impl Input {
             Err(e) => {
                 let file = sources.add(&self.name, String::from_utf8_lossy(&self.bytes));
                 let place = Span::new(file, e.valid_up_to(), e.valid_up_to());
-                let headline = "the file is not text in UTF-8";
-                let found = Diagnostic::error(codes::SYNTAX, place, headline, "the first byte that is not UTF-8");
-                (sources, Err(found.help("save the file with the encoding UTF-8")))
+                let headline = "the file is not UTF-8 text";
+                let found = Diagnostic::error(codes::SYNTAX, place, headline, "first invalid byte");
+                (sources, Err(found.help("save the file in UTF-8")))
             }
         }
     }

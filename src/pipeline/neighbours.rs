@@ -36,7 +36,7 @@ impl Neighbours {
     /// What a file holds, where it may be read; links lead to where they lead.
     fn contents(&self, path: &Path, largest: u64) -> Result<Vec<u8>, String> {
         if self.root.as_ref().is_some_and(|root| !files::lies_in(path, root)) {
-            return Err("it is outside of the folder that may be read".to_string());
+            return Err("it is outside the allowed folder".to_string());
         }
         files::contents(path, largest)
     }
@@ -69,7 +69,7 @@ impl Loader for Neighbours {
 
     fn file(&self, _: FileId, path: &str) -> Result<String, String> {
         let bytes = self.contents(&self.dir.join(path), files::LARGEST_TEXT)?;
-        String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_string())
+        String::from_utf8(bytes).map_err(|_| "it is not UTF-8 text".to_string())
     }
 
     fn stop(&self) -> Stop {

@@ -75,5 +75,5 @@ pub fn schedule_json(schedule: &Schedule) -> Result<String, String> {
 pub fn turns(path: &Path, text: &str, program: &Program) -> Result<Vec<Turn>, String> {
     let name = path.display();
     let schedule: Schedule = serde_json::from_str(text).map_err(|e| format!("`{name}` is not a schedule: {e}"))?;
-    schedule.turns(program).map_err(|e| format!("`{name}` cannot be followed: {e}"))
+    schedule.turns(program).map_err(|e| format!("`{name}` cannot be scheduled: {e}"))
 }

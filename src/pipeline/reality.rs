@@ -11,10 +11,10 @@ impl Reality {
     /// Fails with words for what does not go together.
     pub fn agrees(&self, dry: bool) -> Result<(), String> {
         if self.unseen.is_some() && (self.fidelity == RunFidelity::Process || dry) {
-            return Err("`--unseen` is of robots that move: it needs `--fidelity motion` or `contact`".to_string());
+            return Err("`--unseen` needs `--fidelity motion` or `contact`".to_string());
         }
         if self.really.is_some() && (self.fidelity != RunFidelity::Contact || dry) {
-            return Err("`--really` is of what holds by force and friction: it needs `--fidelity contact`".to_string());
+            return Err("`--really` needs `--fidelity contact`".to_string());
         }
         Ok(())
     }

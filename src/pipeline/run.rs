@@ -94,7 +94,7 @@ pub fn run<'a>(
     let recording = Recording::within(program, choices.keep.error());
     let mut follower = Follower { recording, sampler: Sampler::new(&program.model), progress };
     let moved = choices.moved.iter().map(|moved| (moved, "stands", "its place"));
-    let unseen = choices.unseen.moved().iter().map(|moved| (moved, "really stands", "where it is taken to be"));
+    let unseen = choices.unseen.moved().iter().map(|moved| (moved, "really stands", "its assumed place"));
     for (moved, stands, from) in moved.chain(unseen) {
         let instance = program.scene.get(moved.thing);
         let [x, y] = moved.shift.map(|m| m * 1e3);
@@ -225,7 +225,7 @@ impl Listener for Follower<'_, '_> {
     }
 
     fn assumed(&mut self, time: f64, _: StepId, condition: &Condition) {
-        let text = format!("taken to hold: {}", condition.text);
+        let text = format!("assumed true: {}", condition.text);
         self.recording.log(time, Level::Warning, text, Some(condition.span));
     }
 

@@ -112,7 +112,7 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
     };
     if !left_out.is_empty() {
         let list = left_out.join(", ");
-        print(Stream::Err, &format!("not offered, as no driver that is bound does or tells it: {list}\n"));
+        print(Stream::Err, &format!("not served because no bound driver supports it: {list}\n"));
     }
     let unreached = hardware.connect();
     if !unreached.is_empty() {
@@ -164,7 +164,7 @@ fn attend(
     let limits = Limits { cancel: Some(service.control.cancel()), horizon: f64::INFINITY, ..Limits::default() };
     let execution = exec::execute(&program.plan, &program.scene, &mut paced, limits, &mut listener);
     let well = execution.status == RunStatus::Cancelled;
-    desk.end(if well { "the server is shut down" } else { "the lab has come to a fault" });
+    desk.end(if well { "the server is shut down" } else { "the lab stopped with a fault" });
     // What was told last is still on its way.
     std::thread::sleep(std::time::Duration::from_millis(200));
     drop(server);

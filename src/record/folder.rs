@@ -53,8 +53,8 @@ impl Folder {
         let failed = |e: std::io::Error| format!("cannot create the record `{}`: {}", dir.display(), files::reason(&e));
         match DirBuilder::new().mode(0o700).create(dir) {
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
-                let there = format!("there is something at `{}` already", dir.display());
-                Err(format!("{there}: give the record another name, or go on after it with `--resume`"))
+                let there = format!("`{}` already exists", dir.display());
+                Err(format!("{there}: choose another name for the record, or resume it with `--resume`"))
             }
             made => made.map(|()| Folder { dir: dir.to_path_buf() }).map_err(failed),
         }
@@ -64,7 +64,7 @@ impl Folder {
     pub fn open(dir: &Path) -> Result<Folder, String> {
         match dir.join(JOURNAL).is_file() {
             true => Ok(Folder { dir: dir.to_path_buf() }),
-            false => Err(format!("`{}` is no record: it has no `{JOURNAL}`", dir.display())),
+            false => Err(format!("`{}` is not a record: it has no `{JOURNAL}`", dir.display())),
         }
     }
 

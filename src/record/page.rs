@@ -11,7 +11,7 @@ pub fn page(report: &Report) -> String {
     let workflow = about.workflow.as_deref().unwrap_or("the workflow");
     let mut out = format!("# Deployment of {workflow} of {}\n\n", cell(&about.main));
     let passed = if report.passed { "passed" } else { "did not pass" };
-    out += &format!("It {passed} (`{}`): begun {}, ended {}, ", cell(&report.status), report.begun, report.ended);
+    out += &format!("It {passed} (`{}`): started {}, ended {}, ", cell(&report.status), report.begun, report.ended);
     out += &format!("{} s of lab time, matterixc {}.\n\n", show_number(report.lab_time), cell(&about.tool));
     out += &format!("Program with its bindings: `{}`\n\n", report.program);
     out += &table(
@@ -83,7 +83,7 @@ pub fn page(report: &Report) -> String {
         report.again.iter().map(|a| vec![show_number(a.lab_time), a.device.clone(), a.why.clone()]),
     );
     let held_up = report.held_up.iter().map(|h| [h.lab_time, h.seconds].map(show_number).to_vec());
-    out += &table("Stood still", &["lab time, s", "for, s by the clock"], held_up);
+    out += &table("Paused", &["lab time, s", "for, s by the clock"], held_up);
     out += &table(
         "Behind the clock",
         &["times", "altogether, s", "longest, s", "at lab time, s"],
@@ -105,7 +105,7 @@ pub fn page(report: &Report) -> String {
         }),
     );
     out += &table(
-        "What went wrong",
+        "Failures",
         &["lab time, s", "code", "what"],
         report.faults.iter().map(|f| vec![show_number(f.lab_time), f.code.clone(), f.text.clone()]),
     );
@@ -114,7 +114,7 @@ pub fn page(report: &Report) -> String {
         &["device", "trouble"],
         report.made_safe.iter().map(|m| vec![m.device.clone(), m.trouble.clone().unwrap_or_else(|| "none".into())]),
     );
-    out += "## Signatures\n\n`matterixc verify` of this folder says whether it is whole and replays it; it prints the digest to sign.\n\n";
+    out += "## Signatures\n\n`matterixc verify` of this folder checks that it is complete and unchanged, and replays it; it prints the digest to sign.\n\n";
     out + "Digest: ____________________  Name: ____________________  Date: ____________  Signature: ____________________\n"
 }
 

@@ -36,15 +36,15 @@ pub struct Checked {
 /// Checks the record in a folder; an error where it cannot be read at all.
 pub fn verify(dir: &Path) -> Result<Checked, String> {
     let text = files::read(&dir.join(MANIFEST))?;
-    let manifest: Manifest =
-        serde_json::from_slice(&text).map_err(|e| format!("`{}` is no record: {e}", dir.join(MANIFEST).display()))?;
+    let manifest: Manifest = serde_json::from_slice(&text)
+        .map_err(|e| format!("`{}` is not a record: {e}", dir.join(MANIFEST).display()))?;
     let mut checked = Checked { digest: sha256(&text), ..Checked::default() };
     whole(dir, &manifest, &mut checked)?;
     let journal = files::read_recording(&dir.join(JOURNAL))?;
     match read(&journal[..]) {
         Err(why) => checked.wrong.push(format!("the journal {why}")),
         Ok(past) => {
-            checked.holds.push(format!("the journal is one chain of {} lines", past.entries.len()));
+            checked.holds.push(format!("the journal is an unbroken chain of {} lines", past.entries.len()));
             replayed(dir, &manifest, &past, &mut checked)?;
         }
     }
@@ -58,7 +58,7 @@ fn whole(dir: &Path, manifest: &Manifest, checked: &mut Checked) -> Result<(), S
         match files::read_recording(&dir.join(&sealed.path)) {
             Err(why) => checked.wrong.push(why),
             Ok(bytes) if bytes.len() as u64 != sealed.bytes || sha256(&bytes) != sealed.sha256 => {
-                checked.wrong.push(format!("`{}` is not as it was sealed", sealed.path));
+                checked.wrong.push(format!("`{}` has changed since it was sealed", sealed.path));
             }
             Ok(_) => {}
         }
@@ -67,11 +67,11 @@ fn whole(dir: &Path, manifest: &Manifest, checked: &mut Checked) -> Result<(), S
     gather(dir, dir, &mut there)?;
     for path in there.iter().map(|p| p.display().to_string()).filter(|p| p != MANIFEST) {
         if !manifest.files.iter().any(|sealed| sealed.path == path) {
-            checked.wrong.push(format!("`{path}` is no part of the record"));
+            checked.wrong.push(format!("`{path}` is not part of the record"));
         }
     }
     if checked.wrong.len() == before {
-        checked.holds.push(format!("{} files are as they were sealed", manifest.files.len()));
+        checked.holds.push(format!("{} files are unchanged since they were sealed", manifest.files.len()));
     }
     Ok(())
 }
@@ -81,14 +81,14 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
     let about = &manifest.about;
     let this = env!("CARGO_PKG_VERSION");
     if about.tool != this {
-        let text = format!("it was carried out by version {} and cannot be gone through by {this}", about.tool);
+        let text = format!("it was recorded by version {}, which {this} cannot replay", about.tool);
         checked.wrong.push(text);
         return Ok(());
     }
     let (Some(Entry::Begin { digest: before, seed, speed, .. }), Some(end)) =
         (past.entries.first(), past.entries.last())
     else {
-        checked.wrong.push("the journal says nothing of a deployment".to_owned());
+        checked.wrong.push("the journal contains no deployment".to_owned());
         return Ok(());
     };
     let Entry::End { status, states, .. } = end else {
@@ -96,7 +96,7 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
         return Ok(());
     };
     let main = dir.join(PROGRAM).join(&about.main);
-    let bindings = String::from_utf8(files::read(&dir.join(BINDINGS))?).map_err(|_| "the bindings are no text")?;
+    let bindings = String::from_utf8(files::read(&dir.join(BINDINGS))?).map_err(|_| "the bindings are not text")?;
     let gauged = |c: calibration::Calibrated| Gauged { thing: c.thing, field: c.field, value: c.value };
     let given = calibration::read(&bindings).into_iter().map(gauged).collect();
     let measured = Calibration { name: BINDINGS.to_owned(), text: bindings.clone(), given };
@@ -111,10 +111,10 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
     let file = sources.add(BINDINGS, bindings.clone());
     let (bindings, _) = binding::read(&program, file, &bindings);
     if digest(&program, &binding::canonical(&program, &bindings))? != *before {
-        checked.wrong.push("the program of the record is not the one that the journal was written for".to_owned());
+        checked.wrong.push("the program of the record is not the one of the journal".to_owned());
         return Ok(());
     }
-    checked.holds.push("the program of the record is the one that was carried out".to_owned());
+    checked.holds.push("the program of the record is the one of the journal".to_owned());
     let control: &'static Control = Box::leak(Box::new(Control::new(&CANCEL, |_| {})));
     let exposed = Exposed::new();
     let course = Course {
@@ -144,27 +144,27 @@ fn compared(
 ) -> Result<(), String> {
     if ending.execution.is_none() && ending.states.is_empty() {
         checked.wrong.push(match ending.diagnostics.first() {
-            Some(d) => format!("it does not begin: {}", d.headline),
-            None => "it does not begin".to_owned(),
+            Some(d) => format!("the replay does not start: {}", d.headline),
+            None => "the replay does not start".to_owned(),
         });
         return Ok(());
     }
     if status == REFUSED {
-        checked.holds.push("it was refused to go on: what there is before that is not gone through again".to_owned());
+        checked.holds.push("the deployment could not continue: the part before that is not replayed".to_owned());
         return Ok(());
     }
     if ending.status != status {
         let why = ending.diagnostics.first().map_or(String::new(), |d| format!(": {}", d.headline));
-        checked.wrong.push(format!("gone through again it is `{}`, not `{status}`{why}", ending.status));
+        checked.wrong.push(format!("the replay ends as `{}`, not `{status}`{why}", ending.status));
     }
     match ending.states == states {
-        true => checked.holds.push("gone through again, the twin comes to the same states to the last bit".to_owned()),
-        false => checked.wrong.push("gone through again, the twin comes to other states".to_owned()),
+        true => checked.holds.push("the replay reaches the same states to the last bit".to_owned()),
+        false => checked.wrong.push("the replay reaches other states".to_owned()),
     }
     let report = Report::of(manifest.about.clone(), &past.entries, ending).json()?;
     match files::read(&dir.join(REPORT))? == report.as_bytes() {
-        true => checked.holds.push("the report says what the journal says".to_owned()),
-        false => checked.wrong.push("the report does not say what the journal says".to_owned()),
+        true => checked.holds.push("the report agrees with the journal".to_owned()),
+        false => checked.wrong.push("the report contradicts the journal".to_owned()),
     }
     Ok(())
 }

@@ -110,8 +110,8 @@ fn a_robot_drives_to_a_place_or_it_is_said_why_not() {
     write(&dir, "blocked.mtx", lab("(0.3, 2.5, 0)", kuka));
     write(&dir, "fixed.mtx", lab("(2, 4, 0)", "FrankaPanda { gripper: FrankaHand {} } at (0, 0, 0) m"));
     for (file, said) in [
-        ("blocked.mtx", "error[collision]: `robot` runs into `table`"),
-        ("fixed.mtx", "error[out-of-reach]: `robot` does not drive"),
+        ("blocked.mtx", "error[collision]: `robot` would collide with `table`"),
+        ("fixed.mtx", "error[out-of-reach]: `robot` cannot drive"),
     ] {
         let ended = matterixc_in(&dir, &["check", file, "--format", "concise"]);
         assert!(ended.out.contains(&format!("{file}:10:5: {said}")), "{}", ended.out);

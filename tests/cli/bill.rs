@@ -151,7 +151,7 @@ fn bad_arguments_are_said_in_words() {
         (vec!["bill", pump, "--format", "xml"], 2, "invalid value"),
         (vec!["bill", pump, "--prices", "none.csv"], 2, "cannot read `none.csv`"),
         (vec!["bill", pump, "--prices", "prices.csv"], 2, "the first line must be `item,price,currency,quantity,unit`"),
-        (vec!["bill", pump, "--workflow", "empty"], 1, "there is no workflow `empty`"),
+        (vec!["bill", pump, "--workflow", "empty"], 1, "this file has no workflow `empty`"),
         (vec!["bill", "bad.mtx"], 1, "unknown-name"),
     ] {
         let ended = matterixc_in(&dir, &args);

@@ -19,7 +19,7 @@ const CASES: [(&str, u64, &str); 13] = [
     ("effect", 9, "a division by zero, where `dial.last` is 0 mm"),
     ("skill", 9, "a division by zero, where `dial.last` is 0 mm"),
     ("initial", 5, "at the start: a division by zero, where `cork.density` is 0"),
-    ("stuck", 6, "most of it is by `growth(vessel)`"),
+    ("stuck", 6, "mostly because of `growth(vessel)`"),
     ("breach", 17, "`leak("),
 ];
 

@@ -219,7 +219,7 @@ fn a_place_without_a_statement_is_a_usage_error() {
         (&["--at", "999", "--contents"], "has 43 lines"),
         (
             &["--at", "3", "--contents"],
-            "no statement of a workflow at this place of `examples/dilution.mtx`; the nearest are at 21",
+            "`examples/dilution.mtx` has no statement of a workflow at this place; the nearest are at 21",
         ),
         (&["--at", "22:1", "--contents"], "no statement"),
         (&["examples/sn1.mtx", "--at", "20", "--contents"], "one with `--at`"),

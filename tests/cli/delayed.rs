@@ -160,7 +160,7 @@ fn a_table_has_an_end() {
     let ran = matterixc(&["run", &file]);
     assert_eq!(ran.code, 1);
     let said = ran.out + &ran.err;
-    assert!(said.contains("not-a-number") && said.contains("read beyond its"), "{said}");
+    assert!(said.contains("not-a-number") && said.contains("read outside its"), "{said}");
 }
 
 #[test]

@@ -134,7 +134,7 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
         (
             "device",
             "heat hotplate to 60 degC\nstop heating hotplate".into(),
-            &["does not reach `hotplate`", "a.mtx:16"],
+            &["cannot control `hotplate`", "a.mtx:16"],
         ),
         (
             "branch",
@@ -147,9 +147,9 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
             format!(
                 "let m <- read hotplate\n{tip}\naspirate m / (1 kg/mL) + 50 uL from stock[A1] by ot2.left\ndrop tip by ot2.left"
             ),
-            &["needs to know every value beforehand", "a.mtx:18"],
+            &["needs every value before the run", "a.mtx:18"],
         ),
-        ("beside", format!("parallel {{ {tip}; wait 1 s }}\ndrop tip by ot2.left"), &["one thing after the other"]),
+        ("beside", format!("parallel {{ {tip}; wait 1 s }}\ndrop tip by ot2.left"), &["one step after the other"]),
         ("handler", format!("sequence {{ {tip} }} on failure {{ wait 1 s }}\ndrop tip by ot2.left"), &["a handler"]),
         (
             "robots",
@@ -159,14 +159,14 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
         (
             "bin",
             format!("{tip}\ndrop tip into ot2.trash by ot2.left"),
-            &["no command to `drop tip`", "`PipetteCommands`"],
+            &["no command for `drop tip`", "`PipetteCommands`"],
         ),
         (
             "elsewhere",
             format!(
                 "{tip}\naspirate 50 uL from stock[A1] by ot2.left\ndispense 50 uL into aside[A1] by ot2.left\ndrop tip by ot2.left"
             ),
-            &["`ot2.left` does not reach `aside[A1]`", "a.mtx:18"],
+            &["`ot2.left` cannot reach `aside[A1]`", "a.mtx:18"],
         ),
     ];
     for (name, lines, expected) in cases {
@@ -188,7 +188,7 @@ fn errors_of_check_and_failures_of_the_performance_keep_it_from_being_written() 
     let none =
         "mtx 1\nuse std::heating::IkaRetControl\nlab bench { ambient: 22 degC, plate = IkaRetControl at (0, 0, 0) m }
 workflow rest in bench { heat plate to 60 degC; stop heating plate }\n";
-    assert!(refused("no_robot", none, "opentrons-json").contains("needs a robot of Opentrons"));
+    assert!(refused("no_robot", none, "opentrons-json").contains("needs an Opentrons robot"));
     assert!(refused("no_arm", none, "urscript").contains("no arm moves"));
     assert!(refused("no_joints", none, "joint-trajectory").contains("no robot with joints moves"));
 }
@@ -273,7 +273,7 @@ lab deck {\n    lamp = Led on ot2.slot[9]",
     write(&dir, "a.mtx", text);
     let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-json"]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("error[wrong-message]: `blink` is no command of Opentrons"), "{}", ended.err);
+    assert!(ended.err.contains("error[wrong-message]: unknown Opentrons command `blink`"), "{}", ended.err);
 }
 
 #[test]

@@ -7,7 +7,7 @@ fn a_missing_file() {
     for command in ["check", "run", "fmt"] {
         let ended = matterixc(&[command, "nowhere.mtx"]);
         assert_eq!((ended.code, ended.out.as_str()), (2, ""));
-        assert_eq!(ended.err, "error: cannot read `nowhere.mtx`: there is no such file\n");
+        assert_eq!(ended.err, "error: cannot read `nowhere.mtx`: the file does not exist\n");
     }
 }
 

@@ -44,7 +44,7 @@ fn a_bench_without_mistakes_yields_nothing() {
 #[test]
 fn names_of_an_import_that_failed_are_not_missed_again() {
     let (code, headline) = only("module", &BENCH.replace("glassware", "glasware"));
-    assert_eq!((code.as_str(), headline.as_str()), ("unknown-module", "there is no module `std::glasware`"));
+    assert_eq!((code.as_str(), headline.as_str()), ("unknown-module", "unknown module `std::glasware`"));
     let wrong = BENCH.replace("glassware::Beaker250mL", "glassware::{Beaker250mL, Beaker25mL}");
     let wrong = wrong.replace("beaker = Beaker250mL", "beaker = Beaker25mL");
     assert_eq!(only("item", &wrong).1, "`std::glassware` declares no `Beaker25mL`");
@@ -179,11 +179,11 @@ fn what_a_lab_puts_where_nothing_bears_it() {
         ("beyond", "    a = Step on table at (0, 700) mm", "`a` stands beyond the edge of `table`"),
         ("half", "    a = Step on table at (0, 460) mm", "`a` stands beyond the edge of `table`"),
         ("on_another", "    b = Step on table\n    a = Step on b at (30, 0) mm", "`a` stands beyond the edge of `b`"),
-        ("each_other", "    a = Step on b\n    b = Step on a", "`a` stands on `b` and that on `a`"),
+        ("each_other", "    a = Step on b\n    b = Step on a", "`a` is placed on `b`, and that again on `a`"),
         (
             "three",
             "    a = Step on b\n    b = Step on c\n    c = Step on a",
-            "`a` stands on `b`, that on `c` and that on `a`",
+            "`a` is placed on `b`, that on `c`, and that again on `a`",
         ),
     ];
     for (name, lines, headline) in bad {

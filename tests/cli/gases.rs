@@ -158,11 +158,11 @@ fn a_gas_stands_in_its_own_equilibrium_alone() {
     let dir = folder("gas_forms");
     let gases = "use std::equilibria\nspecies CO2(g) { formula: \"CO2\" }\nspecies O2(g) { formula: \"O2\" }\nspecies CO2(s) { formula: \"CO2\" }";
     let wrong = [
-        ("CO2(g) <-> CO2(s)", "`CO2(s)` is not a neutral species that is dissolved"),
+        ("CO2(g) <-> CO2(s)", "`CO2(s)` is not a neutral dissolved species"),
         ("CO2(g) + O2(g) <-> CO2 + O2", "its right side is not one dissolved species"),
         ("CO2(g) + water <-> H+ + HCO3-", "its right side is not one dissolved species"),
         ("CO2 <-> CO2(g)", "its left side is not one gas"),
-        ("2 CO2(g) <-> 2 CO2", "there is one each"),
+        ("2 CO2(g) <-> 2 CO2", "both coefficients must be 1"),
         ("CO2(g) <-> O2", "does not balance"),
     ];
     let said = |text: String| {
@@ -186,13 +186,13 @@ fn a_gas_stands_in_its_own_equilibrium_alone() {
     let ksp = "equilibrium x: CO2(g) <-> CO2 { ksp: 0.03 }";
     assert!(said(lab(&format!("{gases}\n{ksp}"), "", "100 g of water", "")).contains("its left side is not one solid"));
     let reaction = "use std::gases\nreaction r: CO2(g) -> CO2 { rate: 1 1/s }";
-    assert!(said(lab(reaction, "", "100 g of water", "")).contains("names the gas `CO2(g)`"));
+    assert!(said(lab(reaction, "", "100 g of water", "")).contains("contains the gas `CO2(g)`"));
     let held = lab("use std::gases", "", "100 g of water + 1 mmol of CO2(g)", "");
     assert!(said(held).contains("no vessel holds `CO2(g)`"));
     let read = lab("use std::gases", "", "100 g of water", "    expect cup.contents.amount[CO2(g)] < 1 mol\n");
     assert!(said(read).contains("no vessel holds `CO2(g)`"));
     let plain = lab("use std::gases", "", "100 g of water", "    expect gas_pressure(cup.contents, CO2) < 1 bar\n");
-    assert!(said(plain).contains("no equilibrium of the file has `CO2` as a gas"));
+    assert!(said(plain).contains("no equilibrium of this file contains `CO2` as a gas"));
     let pressures = OPEN.replace(" exchange_rate", " gases: [CO2(g)], pressures: [1 bar, 2 bar], exchange_rate");
     assert!(said(lab("use std::gases", &pressures, "100 g of water", "")).contains("1 gases above it and 2 pressures"));
 }

@@ -37,22 +37,14 @@ fn wells_that_are_not_there_are_reported_with_what_is() {
         (
             "beyond",
             "note \"a\"\nexpect plate[A13].room > 0 mL",
-            "unknown-member: `plate` has no place `A13`: it has A1 .. H12",
+            "unknown-member: `plate` has no `A13`: it has A1 .. H12",
         ),
-        ("trough", "expect stock[B1].room > 0 mL", "unknown-member: `stock` has no place `B1`: it has A1 .. A12"),
-        (
-            "slot",
-            "expect plate.support == ot2.slot[12]",
-            "unknown-member: `ot2.slot` has no place `12`: it has 1 .. 11",
-        ),
+        ("trough", "expect stock[B1].room > 0 mL", "unknown-member: `stock` has no `B1`: it has A1 .. A12"),
+        ("slot", "expect plate.support == ot2.slot[12]", "unknown-member: `ot2.slot` has no `12`: it has 1 .. 11"),
         ("row", "for w in plate.row(9) { note \"x\" }", "unknown-member: `plate` has 8 rows"),
         ("back", "for w in plate[C1 .. A1] { note \"x\" }", "empty-range: the range `C1 .. A1` is empty"),
-        (
-            "corners",
-            "for w in plate[A1 .. 3] { note \"x\" }",
-            "unknown-member: `plate` has no place `3`: it has A1 .. H12",
-        ),
-        ("list", "for w in ot2 { note \"x\" }", "type-mismatch: an instance is not a finite set"),
+        ("corners", "for w in plate[A1 .. 3] { note \"x\" }", "unknown-member: `plate` has no `3`: it has A1 .. H12"),
+        ("list", "for w in ot2 { note \"x\" }", "type-mismatch: cannot loop over an instance"),
         (
             "kind",
             "aspirate 50 uL from tips[A1] by ot2.left",
@@ -76,7 +68,7 @@ fn wells_that_are_not_there_are_reported_with_what_is() {
         (
             "empty",
             "let none = [1, 2].pairs.last.second\nlet x = [1].pairs.first",
-            "empty-range: an empty list has no `first`",
+            "empty-range: the list is empty: it has no `first`",
         ),
     ] {
         assert_eq!(only(name, &step(text)), wanted, "{text}");
@@ -101,7 +93,7 @@ fn slips_in_grids_and_their_contents_are_reported() {
         (
             "none",
             lab("", "t = OpticalTable at (0, 0, 0) m holding { A1: 1 uL of water }"),
-            "type-mismatch: `t` (OpticalTable) has no places to fill one by one",
+            "type-mismatch: `t` (OpticalTable) has no separate places to fill",
         ),
         (
             "place",
@@ -111,14 +103,14 @@ fn slips_in_grids_and_their_contents_are_reported() {
         (
             "many",
             lab("asset P: WellPlate { wells[A1 .. ZZ9999] = Well { max_volume: 1 mL } }", ""),
-            "out-of-range: a grid has 2000 places at most",
+            "out-of-range: a grid has at most 2000 places",
         ),
         ("itself", lab("asset P: WellPlate { wells[A1 .. B2] = P }", ""), "circular: `P` contains itself"),
         ("part", lab("asset P { inner = P }", ""), "circular: `P` contains itself"),
         (
             "wrong",
             lab("asset P: TipRack { tips[A1 .. B2] = Well { max_volume: 1 mL } }", ""),
-            "type-mismatch: `tips` expects Tip, but `Well` is none",
+            "type-mismatch: `tips` expects Tip, but `Well` is not one",
         ),
         ("lacking", lab("asset P: WellPlate { mass: 1 g }", ""), "missing-field: `P` has no `wells`"),
     ] {
@@ -213,11 +205,11 @@ workflow w in l {
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
     for (name, json, wanted) in [
         ("none", "{", "is not JSON"),
-        ("schema", r#"{ "schemaVersion": 1 }"#, "its schema is 1, known are 2 and 3"),
+        ("schema", r#"{ "schemaVersion": 1 }"#, "its schema is 1, but only 2 and 3 are supported"),
         ("other", r#"{ "ordering": [] }"#, "it has no `schemaVersion`"),
         ("bare", r#"{ "schemaVersion": 2 }"#, "missing field"),
-        ("empty", &RACK.replace("1500", "0"), "the size of `A1` is not above 0"),
-        ("label", &RACK.replace("\"A1\"", "\"1A\""), "`1A` is not a place such as `A1`"),
+        ("empty", &RACK.replace("1500", "0"), "the size of `A1` must be above 0"),
+        ("label", &RACK.replace("\"A1\"", "\"1A\""), "`1A` is not the name of a well such as `A1`"),
         ("shape", &RACK.replace("circular", "round"), "unknown variant `round`"),
     ] {
         write(&dir, "plates/rack.json", json);

@@ -70,7 +70,7 @@ fn an_interaction_has_the_numbers_of_its_charges() {
     let dir = folder("interaction_form");
     let cases = [
         ("Na+ + Cl- { theta: 0.1 }", "interaction-form", "no `theta`"),
-        ("Na+ + Cl- { source: \"a table\" }", "missing-field", "has no number"),
+        ("Na+ + Cl- { source: \"a table\" }", "missing-field", "has no parameter"),
         ("Na+ + K+ { theta: 0.1, reach: [2, 12] }", "interaction-form", "no `reach`"),
         ("Na+ { b0: 0.1 }", "interaction-form", "two different species, or three"),
         ("Na+ + K+ + H+ { psi: 0.1 }", "interaction-form", "with both signs of charge"),

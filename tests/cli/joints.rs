@@ -49,7 +49,7 @@ fn a_part_that_a_process_turns_stops_the_run_where_it_runs_into_something() {
     write(&dir, "disc.mtx", text);
     let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion"]);
     assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
-    assert!(ended.err.contains("`plate` of `disc` runs into `post`"), "{}", ended.err);
+    assert!(ended.err.contains("`plate` of `disc` collides with `post`"), "{}", ended.err);
     write(&dir, "disc.mtx", text.replace("(200, 200) mm", "(200, 400) mm"));
     let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion", "--out", "out"]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);

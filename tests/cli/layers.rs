@@ -91,11 +91,11 @@ fn what_cannot_be_is_refused() {
         ("species X { formula: \"I2\", dissolved_in: water }", "needs no `dissolved_in`"),
         ("species X { formula: \"I2\", dissolved_in: X }", "not a liquid"),
         ("species X { formula: \"I2\", dissolved_in: chlorofrom }", "chlorofrom"),
-        ("equilibrium x: I2 <-> I2 { partition: 3 }", "a partition constant is that of one species"),
+        ("equilibrium x: I2 <-> I2 { partition: 3 }", "`partition` needs the equation of one species"),
         (
             "species L { formula: \"C6H14\", heat_capacity: 200 J/(mol*K) }
 species X { formula: \"I2\", dissolved_in: L }\nequilibrium x: I2 <-> X { partition: 3 }",
-            "the density of `L` is not known",
+            "the density of `L` is unknown",
         ),
     ];
     for (before, why) in cases {

@@ -94,17 +94,17 @@ fn what_follows_from_one_mistake_is_not_said() {
     let heated = BENCH
         .replace("wait 5 s", "heat plate to 60 degC\n    wait 5 min\n    expect beaker.contents.temperature > 30 degC");
     for (slip, from, to, headline) in [
-        ("call", "wait 5 min", "time.sleep(10)", "a step starts with a verb"),
+        ("call", "wait 5 min", "time.sleep(10)", "a step must start with a verb"),
         ("bracket", "(0, 0, 0) m", "(0, 0, 0 m holding 60 g of water", "`(` is not closed"),
-        ("range", "> 30 degC", "in 20 . 30 degC", "a range is written with `..`"),
+        ("range", "> 30 degC", "in 20 . 30 degC", "write a range with `..`"),
         ("nameless", "    table", "    Beaker250mL at (1, 1, 0) m\n    table", "this `Beaker250mL` has no name"),
         (
             "step",
             "    table",
             "    transfer 100 uL from a to b\n    table",
-            "a step stands in a workflow, not in a lab",
+            "a step belongs in a workflow, not in a lab",
         ),
-        ("brace", "wait 5 min", "note \"now x :.1}\"", "`}` in a text stands for a value"),
+        ("brace", "wait 5 min", "note \"now x :.1}\"", "`}` in a text starts or ends a value"),
         (
             "result",
             "wait 5 min",
@@ -152,10 +152,10 @@ fn a_label_names_what_is_weighed_in_or_an_ion_of_it() {
     assert_eq!(matterixc_in(&dir, &["check", "bench.mtx"]).out, "no findings\n");
 
     let (headline, help, _) = finding("none", &text.replace("K+", "ethanol"));
-    assert_eq!(headline, "the label of `iodide` is of `ethanol`, of which its recipe holds none");
+    assert_eq!(headline, "the label of `iodide` gives `ethanol`, but the recipe contains none");
     assert_eq!(help, ["label a species of the recipe, or add `ethanol` to it"]);
     let (headline, ..) = finding("zero", &text.replace("0.04 mol/kg of K+", "0 mol/kg of KI"));
-    assert_eq!(headline, "the label of `iodide` is zero: its recipe gives 0.0394977 mol/kg of KI");
+    assert_eq!(headline, "the label of `iodide` is zero: by its recipe it contains 0.0394977 mol/kg of KI");
 }
 
 #[test]
@@ -172,8 +172,8 @@ fn a_catalyst_of_the_order_alone_is_one_mistake() {
     let reaction = "reaction decay: 2 H2O2 -> 2 H2O + O2 { rate: 1.2e-3 L/(mol*s), order: { H2O2: 1, I-: 1 } }\n\nlab";
     let text = BENCH.replace("100 g of water", "100 mL of water + 0.1 mmol of H2O2 + 1 mmol of KI");
     let (found, help, _) = finding("catalyst", &text.replace("lab", reaction));
-    assert_eq!(found, "`I-` is not in the equation of `decay`");
-    assert_eq!(help, ["a catalyst stands on both sides: `A + C -> B + C`"]);
+    assert_eq!(found, "the equation of `decay` does not contain `I-`");
+    assert_eq!(help, ["write a catalyst on both sides: `A + C -> B + C`"]);
 }
 
 #[test]

@@ -18,7 +18,7 @@ fn what_leaves_no_doubt_is_mended_and_the_rest_is_left() {
     assert_eq!(ended.code, 1);
     let done = "w.mtx:7:52: fixed: write `//`\nw.mtx:10:28: fixed: write `==`\nw.mtx:11:11: fixed: remove the point\n";
     assert_eq!(ended.err, done);
-    assert_eq!(ended.out, "w.mtx:7:47: error[unknown-name]: there is no species or solution `watr`\n1 error\n");
+    assert_eq!(ended.out, "w.mtx:7:47: error[unknown-name]: unknown species or solution `watr`\n1 error\n");
     let mended = WRONG.replace("# µL", "// µL").replace("mass = 100", "mass == 100").replace("5. s", "5 s");
     assert_eq!(fs::read_to_string(dir.join("w.mtx")).expect("the file"), mended);
 
@@ -149,7 +149,7 @@ fn a_file_is_looked_at_again_once_for_each_change_of_what_was_read() {
     put("labs.mtx", &lab.replace("degC", "mL"));
     assert_eq!(looks("unit-mismatch"), 1);
     // Away: one complaint, however much happens beside it.
-    let is_complaint = |line: &String| line.contains("there is no such file");
+    let is_complaint = |line: &String| line.contains("the file does not exist");
     std::fs::remove_file(dir.join("w.mtx")).expect("it was there");
     assert!(complaints.any(|line| is_complaint(&line)));
     for i in 0..3 {
@@ -213,7 +213,7 @@ fn imports_that_are_missing_are_one_finding_with_one_correction() {
         workflow go in bench {\n    repeat 2 times { draw 1 mL from cup by pump; push 1 mL into cup by pump }\n    \
         expect cup.contents.volume > 9 mL\n}\n";
     for (slip, imports, headline, mended) in [
-        ("all", "", "there is no asset type `CavroXlp6000`", None),
+        ("all", "", "unknown asset type `CavroXlp6000`", None),
         (
             "some",
             "use std::glassware::Beaker50mL\nuse std::pumps::CavroXlp6000\n",
@@ -229,7 +229,7 @@ fn imports_that_are_missing_are_one_finding_with_one_correction() {
         (
             "hidden",
             "use std::glassware::Beaker50mL\nuse std::pumps::{CavroXlp6000, draw, piped}\n",
-            "another `push` is meant, which is not imported",
+            "this call needs another `push`, which is not imported",
             Some("use std::pumps::{CavroXlp6000, draw, piped, push}"),
         ),
     ] {

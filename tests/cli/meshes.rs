@@ -56,12 +56,12 @@ fn mistakes_with_meshes_are_reported_where_they_are() {
     let found: Vec<&str> = ended.out.lines().filter_map(|l| l.split_once("shapes.mtx:")).map(|(_, l)| l).collect();
     let expected = [
         "2:40: error[mesh-file]: cannot read `nothing.stl`",
-        "3:40: error[mesh-file]: `broken.stl` is no mesh: it is no STL",
-        "4:35: error[wrong-arguments]: `wedge.obj` does not say its unit",
+        "3:40: error[mesh-file]: `broken.stl` is not a mesh: it is not an STL file",
+        "4:35: error[wrong-arguments]: the file `wedge.obj` does not give its unit of length",
         "5:53: error[out-of-range]",
-        "6:40: error[type-mismatch]: a mesh is named by its file",
+        "6:40: error[type-mismatch]: `mesh` needs the name of a file",
         "7:35: error[wrong-arguments]",
-        "8:25: error[mesh-file]: `link.stl` is no mesh",
+        "8:25: error[mesh-file]: `link.stl` is not a mesh",
     ];
     assert_eq!(found.len(), expected.len(), "{}", ended.out);
     for (found, expected) in found.iter().zip(expected) {
@@ -72,7 +72,11 @@ fn mistakes_with_meshes_are_reported_where_they_are() {
                 workflow look in bench { wait 1 s }\n";
     write(&dir, "lab.mtx", text);
     let ended = matterixc_in(&dir, &["run", "lab.mtx"]);
-    assert!(ended.err.contains("error[unsupported]: a mesh is given where its asset is declared"), "{}", ended.err);
+    assert!(
+        ended.err.contains("error[unsupported]: a mesh must be given in the declaration of its asset"),
+        "{}",
+        ended.err
+    );
 }
 
 #[test]

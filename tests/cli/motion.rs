@@ -75,7 +75,7 @@ fn what_is_out_of_reach_fails_in_a_run_and_is_found_before_it() {
     assert_eq!(found.out.matches("error[").count(), 1, "{}", found.out);
     let ran = matterixc_in(&dir, &["run", "far.mtx", "--fidelity", "motion"]);
     assert_eq!(ran.code, 1);
-    assert!(ran.err.contains("does not reach `beaker`"), "{}{}", ran.out, ran.err);
+    assert!(ran.err.contains("cannot reach `beaker`"), "{}{}", ran.out, ran.err);
 }
 
 #[test]

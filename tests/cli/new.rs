@@ -31,7 +31,7 @@ fn a_folder_with_something_in_it_is_left_alone() {
     write(&dir, "thesis.txt", "do not lose");
     let ended = matterixc_in(&dir, &["new", "."]);
     assert_eq!((ended.code, ended.out.as_str()), (2, ""));
-    assert_eq!(ended.err, "error: `.` exists and is not empty\n");
+    assert_eq!(ended.err, "error: `.` already exists and is not empty\n");
     assert_eq!(names(&dir), ["thesis.txt"]);
 }
 

@@ -94,7 +94,7 @@ fn a_law_whose_rate_follows_what_is_left_takes_nothing_of_nothing() {
 fn a_law_that_takes_from_an_empty_vessel_ends_the_run() {
     let (code, text) = run_case("numerics/runs_dry.mtx", "w", &[]);
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("error[transfer-fraction]: `flow(f)` takes more than there is"), "{text}");
+    assert!(text.contains("error[transfer-fraction]: `flow(f)` removes more than `"), "{text}");
     assert!(text.contains("at 11.97"), "{text}");
 }
 
@@ -114,7 +114,7 @@ fn what_is_unlimited_is_shown_as_that() {
     for command in [["check", "--no-cache", "endless.mtx"].as_slice(), &["run", "endless.mtx"]] {
         let said = matterixc_in(&dir, command);
         let all = said.out + &said.err;
-        assert!(said.code == 1 && all.contains("is unlimited, allowed is 2 m .. 5 m"), "{all}");
+        assert!(said.code == 1 && all.contains("is unlimited, the allowed range is 2 m .. 5 m"), "{all}");
         assert!(all.contains("is unlimited, at most 5 m") && all.contains("is 1 m, at least 2 m"), "{all}");
         assert!(!all.contains("inf"), "{all}");
     }

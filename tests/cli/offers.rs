@@ -81,7 +81,7 @@ fn check(name: &str, text: &str) -> String {
 
 /// The place in an offer, as it stands after `at`.
 fn offered(found: &str) -> Option<&str> {
-    let (_, rest) = found.split_once(" is within reach at ")?;
+    let (_, rest) = found.split_once(" would be within reach at ")?;
     let end = rest.find(" mm")? + 3;
     Some(&rest[..end])
 }
@@ -149,5 +149,5 @@ workflow go in bench {
         format!("{HEAD}{lines}").replace("bench = Optical", "store = Optical").replace("on bench at", "on store at");
     let found = check("gap", &text);
     assert!(found.contains("`kuka` cannot drive to `cup`"), "{found}");
-    assert!(found.contains("between `left` and `right` are 400 mm, and `kuka` needs 6"), "{found}");
+    assert!(found.contains("the gap between `left` and `right` is 400 mm wide, but `kuka` needs 6"), "{found}");
 }

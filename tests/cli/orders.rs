@@ -345,5 +345,5 @@ fn what_waited_for_an_effect_comes_behind_it() {
 #[test]
 fn a_deadlock_names_the_job_that_is_waited_for() {
     let (_, report) = run_case("../faults/530_await_in_a_claim_of_its_job.mtx", "w", &[]);
-    assert!(report.contains("wait for each other") || report.contains("waits for the job `b`"), "{report}");
+    assert!(report.contains("wait for each other") || report.contains("waits for job `b`"), "{report}");
 }

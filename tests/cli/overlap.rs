@@ -26,7 +26,7 @@ fn two_vessels_in_one_place_are_found_without_a_robot_and_once() {
     let found =
         check("vessels", "    a = Beaker250mL on table at (0, 0) mm\n    b = Beaker250mL on table at (30, 20) mm");
     assert_eq!(found.lines().count(), 1, "{found}");
-    assert!(found.starts_with("bench.mtx:17:33: error[overlap]: `b` and `a` are in one place"), "{found}");
+    assert!(found.starts_with("bench.mtx:17:33: error[overlap]: `b` and `a` overlap"), "{found}");
 }
 
 #[test]

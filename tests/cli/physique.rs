@@ -59,19 +59,19 @@ fn what_no_body_has_is_refused_where_it_is_said() {
     let ended = matterixc_in(&dir, &["check", "all.mtx", "--format", "concise"]);
     let found: Vec<&str> = ended.out.lines().filter_map(|l| l.split_once("all.mtx:")).map(|(_, l)| l).collect();
     let expected = [
-        ("2:", "error[out-of-range]: no body has such an inertia"),
-        ("3:", "error[out-of-range]: its mass within its shape has no such inertia"),
+        ("2:", "error[out-of-range]: this inertia is impossible"),
+        ("3:", "error[out-of-range]: this inertia is impossible for its mass and shape"),
         ("4:", "error[type-mismatch]: expected moments of inertia"),
         ("5:", "error[unit-mismatch]: `inertia` expects"),
-        ("6:", "error[out-of-range]: no body has such an inertia"),
+        ("6:", "error[out-of-range]: this inertia is impossible"),
         ("7:", "error[out-of-range]: `friction` cannot be -0.2"),
         ("8:", "error[unit-mismatch]: `friction` expects a plain number"),
         ("9:", "error[mesh-file]: cannot read `nothing.stl`"),
-        ("10:", "error[type-mismatch]: `collision` is what others run into"),
-        ("12:", "error[missing-field]: it has an inertia, but no mass"),
-        ("13:", "error[missing-field]: it is not known where its centre of mass is"),
-        ("14:", "error[wrong-arguments]: a place is given in the pieces of `collision` only"),
-        ("15:", "error[out-of-range]: no body has such an inertia"),
+        ("10:", "error[type-mismatch]: `collision` must be a shape"),
+        ("12:", "error[missing-field]: this asset has an inertia but no mass"),
+        ("13:", "error[missing-field]: the centre of mass of this asset is unknown"),
+        ("14:", "error[wrong-arguments]: only pieces of `collision` take a place"),
+        ("15:", "error[out-of-range]: this inertia is impossible"),
     ];
     assert_eq!(found.len(), expected.len(), "{}", ended.out);
     for (found, (line, said)) in found.iter().zip(expected) {

@@ -203,7 +203,7 @@ mod unix {
         assert!(made.success());
         let ended = matterixc_in(&dir, &["plan", "warm.mtx", "--svg", "out"]);
         assert_eq!(ended.code, 2, "{}", ended.err);
-        assert!(ended.err.contains("it is no regular file"), "{}", ended.err);
+        assert!(ended.err.contains("it is not a regular file"), "{}", ended.err);
         let kind = fs::symlink_metadata(dir.join("out")).expect("it is there").file_type();
         assert!(!kind.is_file());
     }

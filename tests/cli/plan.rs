@@ -118,13 +118,17 @@ fn what_has_no_schedule_and_what_is_none_is_said() {
     let path = write(&dir, "none.mtx", text);
     let ended = matterixc(&["plan", &path]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("error[unschedulable]: no schedule of `jobs` keeps all its windows"), "{}", ended.err);
+    assert!(
+        ended.err.contains("error[unschedulable]: no schedule of `jobs` keeps all of its time windows"),
+        "{}",
+        ended.err
+    );
     let other = write(&dir, "other.mtx", shop(&[&[(0, 1)], &[(0, 2)]]));
     let schedule = write(&dir, "other.json", matterixc(&["plan", &other, "--format", "json"]).out);
     let path = write(&dir, "third.mtx", shop(&[&[(1, 1), (0, 2)]]).replace("workflow jobs", "workflow others"));
     let ended = matterixc(&["run", &path, &format!("--plan={schedule}")]);
     assert_eq!(ended.code, 2);
-    assert!(ended.err.contains("cannot be followed: the schedule is one of another workflow"), "{}", ended.err);
+    assert!(ended.err.contains("cannot be scheduled: the schedule belongs to another workflow"), "{}", ended.err);
     let broken = write(&dir, "broken.json", "{}");
     assert!(matterixc(&["run", &path, &format!("--plan={broken}")]).err.contains("is not a schedule"));
     assert!(matterixc(&["plan", &path, "--time-limit", "30"]).err.contains("write a time with its unit"));

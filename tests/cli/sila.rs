@@ -70,7 +70,7 @@ fn what_a_definition_forbids_is_found_before_anything_runs() {
         ("sila_kind", "time: 1.2 s", "time: 1.2 m", "Duration"),
         ("sila_none", ", quiet: true", "", "needs the option `quiet`"),
         ("sila_zero", "time: 1.2 s", "time: 0 s", "time > 0"),
-        ("sila_other", "from sila", "from urdf", "does not come from `urdf`"),
+        ("sila_other", "from sila", "from urdf", "cannot be imported from `urdf`"),
         ("sila_file", "hotplate.sila.xml", "plate.sila.xml", "cannot read `plate.sila.xml`"),
     ];
     for (name, from, to, wanted) in cases {
@@ -90,7 +90,7 @@ fn a_definition_that_is_none_is_refused_with_its_line() {
     assert!(checked.code == 1 && checked.out.contains("error[sila-file]"), "{}", checked.out);
     assert!(checked.out.contains("\n1 error\n"), "one mistake, one message: {}", checked.out);
     assert!(
-        checked.out.replace("\n  ", " ").contains("no basic type `Bool`") && checked.out.contains("lab.mtx:4"),
+        checked.out.replace("\n  ", " ").contains("unknown basic type `Bool`") && checked.out.contains("lab.mtx:4"),
         "{}",
         checked.out
     );
@@ -122,21 +122,24 @@ fn what_a_capability_declares_itself_goes_before_its_definition() {
 fn a_binding_fits_what_the_driver_speaks_to() {
     let dir = bench("sila_bound", &[]);
     for (bindings, wanted) in [
-        ("[plate]\nport = \"x\"", "speaks to a server of SiLA 2"),
+        ("[plate]\nport = \"x\"", "needs a SiLA 2 server"),
         ("[plate]\nsila = \"x:1\"\nport = \"y\"", "two lines"),
-        ("[plate]\nsila = 3", "`sila` is a text"),
-        ("[plate]\nsila = \"x:1\"\nby = \"hand\"", "by hand and bound to a line"),
-        ("[plate]\nsila = \"x:1\"\nfingerprint = \"AB:CD\"", "a fingerprint is 32 bytes in hexadecimal"),
+        ("[plate]\nsila = 3", "`sila` must be a text"),
+        ("[plate]\nsila = \"x:1\"\nby = \"hand\"", "both to a person and to a line"),
+        ("[plate]\nsila = \"x:1\"\nfingerprint = \"AB:CD\"", "a fingerprint must have 32 bytes in hexadecimal"),
         (
             "[plate]\nsila = \"x:1\"\ncertificate = \"a.pem\"\nfingerprint = \"AB\"",
-            "by its certificate or by its fingerprint",
+            "either the certificate or the fingerprint",
         ),
-        ("[plate]\nsila = \"x:1\"\nlock = \"10 minutes\"", "a lock lasts for a time"),
-        ("[plate]\nsila = \"x:1\"\nlock = \"1 s\"", "a lock lasts from 10 s to 168 h"),
-        ("[plate]\nsila = \"x:1\"\nuser = \"ana\"", "a user has a password"),
-        ("[plate]\nsila = \"x:1\"\npassword_env = \"P\"", "a password belongs to a user"),
-        ("[plate]\nsila = \"x:1\"\nuser = \"ana\"\npassword_env = \"P\"", "a password is not sent without encryption"),
-        ("[plate]\nport = \"/dev/null\"\nlock = \"1 h\"", "`lock` belongs to a server of SiLA 2"),
+        ("[plate]\nsila = \"x:1\"\nlock = \"10 minutes\"", "a lock needs a duration"),
+        ("[plate]\nsila = \"x:1\"\nlock = \"1 s\"", "a lock must last from 10 s to 168 h"),
+        ("[plate]\nsila = \"x:1\"\nuser = \"ana\"", "a user needs a password"),
+        ("[plate]\nsila = \"x:1\"\npassword_env = \"P\"", "a password needs a user"),
+        (
+            "[plate]\nsila = \"x:1\"\nuser = \"ana\"\npassword_env = \"P\"",
+            "a password cannot be sent without encryption",
+        ),
+        ("[plate]\nport = \"/dev/null\"\nlock = \"1 h\"", "`lock` is only for a SiLA 2 server"),
     ] {
         write(&dir, "lab.toml", bindings);
         let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);

@@ -40,7 +40,7 @@ fn a_length_no_shape_has_is_said_as_it_was_typed() {
         ("cylinder(40 mm, 0 mm)", "the height of `cylinder` is 0 mm"),
         ("sphere(-3 cm)", "the diameter of `sphere` is -3 cm"),
         ("vessel(70 mm, 95 mm, -1 mm, 2 mm)", "the wall of `vessel` is -1 mm"),
-        ("turned([(0, 0) mm, (35, 0) mm, (35, 1e9) mm], [])", "a point of an outline is more than 100 m away"),
+        ("turned([(0, 0) mm, (35, 0) mm, (35, 1e9) mm], [])", "this point of an outline is more than 100 m away"),
     ];
     let dir = folder("lengths");
     for (shape, text) in told {

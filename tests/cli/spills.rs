@@ -95,7 +95,7 @@ fn a_tilt_that_does_not_go_with_what_is_said_to_run_out_is_found() {
     let steps = "pick source by panda\n    dash source into target by panda\n    level source at target by panda\n    put back source by panda";
     write(&dir, "bench.mtx", bench("", "Beaker250mL", "200 mL", OWN, steps));
     let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
-    assert!(run.code != 0 && (run.out + &run.err).contains("`source` runs over in the hand of `panda`"));
+    assert!(run.code != 0 && (run.out + &run.err).contains("`source` would spill in the gripper of `panda`"));
     let process = matterixc_in(&dir, &["run", "bench.mtx"]);
     assert_eq!(process.code, 0, "{}{}", process.out, process.err);
 
@@ -259,11 +259,11 @@ fn a_capacity_beyond_the_inside_and_an_inside_beyond_the_outside_are_found_where
     assert_eq!(declared("max_volume: 322 mL").0, 0);
     let outside = "[(0, 0) mm, (35, 0) mm, (35, 95) mm]";
     for (inside, words) in [
-        ("[(0, 2) mm, (36, 2) mm, (36, 95) mm]", "it is 36 mm wide from the middle, the outside 35 mm"),
-        ("[(0, 2) mm, (33, 2) mm, (33, 96) mm]", "it has a point at a height of 96 mm, where the outside has none"),
+        ("[(0, 2) mm, (36, 2) mm, (36, 95) mm]", "its radius is 36 mm, but that of the outside is 35 mm"),
+        ("[(0, 2) mm, (33, 2) mm, (33, 96) mm]", "it has a point at a height of 96 mm, above or below the outside"),
     ] {
         let (code, said) = declared(&format!("shape: turned({outside}, {inside})"));
-        assert!(code == 1 && said.contains("sticks out of its outside") && said.contains(words), "{said}");
+        assert!(code == 1 && said.contains("wider or taller than its outside") && said.contains(words), "{said}");
     }
     // A vessel whose inside is not known may say what it likes.
     assert_eq!(declared("max_volume: 400 mL, shape: cylinder(70 mm, 95 mm)").0, 0);
@@ -283,7 +283,7 @@ fn a_handler_for_what_a_motion_fails_with_is_no_dead_one() {
         assert!(code == 0 && !said.contains("dead-branch"), "{name}: {said}");
     }
     let (_, said) = handled("wait 1 s", "spilled");
-    assert!(said.contains("nothing before it fails with `spilled`"), "{said}");
+    assert!(said.contains("no step before this handler can fail with `spilled`"), "{said}");
     // The handler takes it in a run, and what it does is looked at.
     let steps = "pick source by panda\n    sequence { lean source at target by panda } on spilled { note \"ran over\" }\n    \
                  level source at target by panda\n    put back source by panda";
@@ -337,7 +337,7 @@ fn joints_that_turn_so_that_what_is_carried_runs_over_are_found() {
         (check.code, check.out + &check.err)
     };
     let (code, said) = check(" holding 68 mL of water");
-    assert!(code == 1 && said.contains("error[spilled]: `cup` runs over in the hand of `arm`"), "{said}");
+    assert!(code == 1 && said.contains("error[spilled]: `cup` would spill in the gripper of `arm`"), "{said}");
     let (code, said) = check(" holding 30 mL of water");
     assert_eq!(code, 0, "{said}");
     // What only a run can tell, as how much a pump has brought by then, the run says.
@@ -374,7 +374,7 @@ fn a_vessel_that_is_filled_over_its_rim_in_a_hand_is_found_when_it_runs_over() {
         pumped(&format!("pump 180 mL at 60 mL/min by pump\n    {UPRIGHT}\n    put back source by panda")),
     );
     let run = matterixc_in(&dir, &["run", "bench.mtx", "--fidelity", "motion", "--out", "out"]);
-    assert!(run.code == 1 && run.out.contains("tilted by 35 deg, and it runs over"), "{}{}", run.out, run.err);
+    assert!(run.code == 1 && run.out.contains("holds it tilted by 35 deg"), "{}{}", run.out, run.err);
     // 141.5 mL take as many seconds, from 3.3 s on.
     let line = run.out.lines().find(|line| line.starts_with("Failure at ")).expect("a failure");
     let time: f64 = line.trim_start_matches("Failure at ").trim_end_matches(" s").parse().expect("a time");
@@ -392,7 +392,7 @@ fn a_vessel_that_is_filled_over_its_rim_in_a_hand_is_found_when_it_runs_over() {
     matterixc_in(&dir, &["run", "left.mtx", "--fidelity", "motion", "--out", "left"]);
     let verdict = matterixc_in(&dir, &["verify", "left"]);
     // 280 mL are in it then, and told to a thousandth.
-    let told = ["38.2", "38.3", "38.4", "38.5"].map(|ml| format!("{ml} mL run over the rim of `source`"));
+    let told = ["38.2", "38.3", "38.4", "38.5"].map(|ml| format!("{ml} mL spill over the rim of `source`"));
     assert!(verdict.code == 1 && told.iter().any(|told| verdict.out.contains(told)), "{}", verdict.out);
 }
 

@@ -47,7 +47,7 @@ fn a_request_to_terminate_ends_a_run_in_order() {
     let ended = run.wait_with_output().expect("it ends");
     let said = after.join().expect("read").expect("text");
     assert_eq!(ended.status.code(), Some(1), "{said}");
-    let (_, last) = said.split_once("stopping: what `finally` says is done first").expect("it says that it stops");
+    let (_, last) = said.split_once("stopping: `finally` runs first").expect("it says that it stops");
     assert!(last.contains("stop heating plate"), "{last}");
 
     let out = dir.join("out");
@@ -110,9 +110,9 @@ fn what_is_cut_short_says_so_and_never_passes_for_whole() {
     write(&dir, "test.mtx", format!("{LONG}{test}"));
     write(&dir, "shop.mtx", shop());
     let cases: [(&[&str], &str); 5] = [
-        (&["plan", "shop.mtx", "--time-limit", "10 min"], "stopped before the search had ended"),
+        (&["plan", "shop.mtx", "--time-limit", "10 min"], "stopped before the end of the search"),
         (&["emit", "long.mtx", "--target", "commands", "--out", "steps.txt"], "nothing is written"),
-        (&["bill", "long.mtx"], "stopped before the run had ended"),
+        (&["bill", "long.mtx"], "stopped before the end of the run"),
         (&["test", "test.mtx"], "stopped before all tests had run"),
         (&["study", "study.mtx"], "stopped before all runs had ended"),
     ];

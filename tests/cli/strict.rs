@@ -37,20 +37,20 @@ fn each_slip_is_one_finding() {
         ("ring", "= 0.4 m", "= 0.5 stride", "circular: the unit `stride` is defined by itself"),
         ("bound", "conductance: 3", "conductance: -3", "out-of-range: `conductance` cannot be -3 W/K"),
         ("relation", "piped: true", "piped: 3", "type-mismatch: `piped` expects a truth value, found a plain number"),
-        ("order", "HI: 1 }", "NaCl: 1 }", "unknown-field: `NaCl` is not in the equation of `ferment`"),
+        ("order", "HI: 1 }", "NaCl: 1 }", "unknown-field: the equation of `ferment` does not contain `NaCl`"),
         ("requires", "{\n    rate", "{ // a note\n    rate", ""),
-        ("member", "requires: temp", "requires: tmep", "unknown-name: there is no `tmeperature` here"),
+        ("member", "requires: temp", "requires: tmep", "unknown-name: unknown name `tmeperature`"),
         ("whole", "n: Int = 2) in", "n: Int = 2.5) in", "type-mismatch: `n` expects a whole number, found 2.5"),
-        ("hidden", "let first", "let cup", "duplicate-name: `cup` is a name of the lab already"),
+        ("hidden", "let first", "let cup", "duplicate-name: the lab already has the name `cup`"),
         (
             "loop",
             "for t in [1 s, 2 s] { wait t }",
             "for cup in [1 s] { wait cup }",
-            "duplicate-name: `cup` is a name of the lab already",
+            "duplicate-name: the lab already has the name `cup`",
         ),
         ("list", "[1 s, 2 s]", "[1 s, 2 kg]", "unit-mismatch: a list of Duration (s) cannot hold Mass (kg)"),
         ("kinds", "[1 s, 2 s]", "[cup, 2 s]", "type-mismatch: a list of an instance cannot hold Duration (s)"),
-        ("handlers", "on failure", "on timeout", "duplicate-name: `timeout` is handled twice here"),
+        ("handlers", "on failure", "on timeout", "duplicate-name: `timeout` has two handlers here"),
         ("one", "go (cup, plate)", "go cup", "wrong-arguments: `go` takes 2 values here, found an instance"),
         ("three", "go (cup, plate)", "go (cup, cup, cup)", "wrong-arguments: `go` takes 2 values here, found 3 values"),
     ];
@@ -82,7 +82,7 @@ fn modules_are_files_below_the_folder_of_the_first() {
     let ended = matterixc_in(&dir, &["run", "main.mtx"]);
     assert_eq!(ended.code, 0, "{}", ended.err);
     for (from, to, wanted) in [
-        ("parts::labs::bench", "parts::lbas::bench", "there is no module `parts::lbas`"),
+        ("parts::labs::bench", "parts::lbas::bench", "unknown module `parts::lbas`"),
         ("parts::labs::bench", "parts::labs::bnech", "`parts::labs` declares no `bnech`"),
     ] {
         write(&dir, "main.mtx", main.replace(from, to));

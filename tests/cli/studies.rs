@@ -118,7 +118,7 @@ study timeouts of watch {
     assert!(ended.err.contains("the grids of `timeouts` have 10 points"), "{}", ended.err);
     write(&dir, "half.mtx", format!("{DECAY}{study}"));
     let ended = matterixc_in(&dir, &["check", "half.mtx"]);
-    assert!(ended.out.contains("`turns` is a whole number, and these values are not"), "{}", ended.out);
+    assert!(ended.out.contains("`turns` must be a whole number, but these values are not"), "{}", ended.out);
 }
 
 /// Normal numbers by Box and Muller from SplitMix64.
@@ -222,16 +222,16 @@ fn findings_point_at_paths_and_cells() {
         found.iter().map(|l| format!("{}: {}", text(&l["code"]), text(&l["headline"]))).collect::<Vec<_>>()
     };
     for (lines, wanted) in [
-        ("vary beaker.initial[Q] in 1 g .. 2 g", "unknown-parameter: there is no parameter `beaker.initial[Q]` here"),
-        ("vary decay.rat in 1 1/s .. 2 1/s", "unknown-parameter: there is no parameter `decay.rat` here"),
+        ("vary beaker.initial[Q] in 1 g .. 2 g", "unknown-parameter: unknown parameter `beaker.initial[Q]`"),
+        ("vary decay.rat in 1 1/s .. 2 1/s", "unknown-parameter: unknown parameter `decay.rat`"),
         (
             "vary beaker.contents.temperature in 20 degC .. 30 degC",
-            "cannot-vary: `beaker.contents.temperature` changes in the run and cannot vary",
+            "cannot-vary: `beaker.contents.temperature` cannot vary: it changes during the run",
         ),
         ("vary beaker.initial[P] in -1 mmol .. 2 mmol", "out-of-range: `beaker.initial[P]` cannot be -1 mmol"),
         ("vary limit in 1 s .. 2 g", "unit-mismatch: Duration (s) cannot be compared with Mass (kg)"),
-        ("vary limit in 2 s .. 1 s", "empty-range: the range is empty: its lower end is above its upper end"),
-        ("runs 3", "unusable-number: the grids have 2 points, and the runs do not go into them evenly"),
+        ("vary limit in 2 s .. 1 s", "empty-range: this range is empty: its lower end is above its upper end"),
+        ("runs 3", "unusable-number: the grids have 2 points: the number of runs must be a multiple of this"),
         ("report took = 1 s", "duplicate-name: `took` is reported twice"),
     ] {
         assert_eq!(check(lines), [wanted], "{lines}");

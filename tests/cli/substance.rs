@@ -56,7 +56,7 @@ fn every_number_is_printed_with_its_source_in_full() {
         "  CAS                   67-64-1\n",
         "  boiling point         56.1 degC  [crc]\n",
         "  flash point           -20 degC  [iec]\n",
-        "  to use it             nothing: every file sees std::species\n",
+        "  to use it             no import needed: every file sees std::species\n",
     ] {
         assert!(page.contains(line), "{line}{page}");
     }
@@ -106,7 +106,7 @@ fn an_unknown_name_suggests_near_ones() {
     assert_eq!((ended.code, ended.out.as_str()), (1, ""));
     assert_eq!(
         ended.err,
-        "error: there is no substance `dioxan`\nhelp: did you mean `dioxane`, `dioxolane` or `trioxane`?\n"
+        "error: unknown substance `dioxan`\nhelp: did you mean `dioxane`, `dioxolane` or `trioxane`?\n"
     );
     let ended = matterixc(&["substance", "qqqqqqqqqqqqqqqqqq"]);
     assert_eq!(ended.code, 1);

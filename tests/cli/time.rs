@@ -88,7 +88,8 @@ fn one_instance_in_two_branches_is_found_where_they_meet() {
     let two = "start one = { heat plate to 60 degC; wait 1 min }\nstart two = { heat plate to 80 degC; wait 1 min }";
     only("jobs", two, twice);
     none("claims", &two.replace("{ ", "{ claim plate { ").replace(" min }", " min } }"));
-    let held = "error claimed-twice: `heat plate to 80 degC` uses `plate` while another branch or job has claimed it";
+    let held =
+        "error claimed-twice: `heat plate to 80 degC` uses `plate` while another branch or job holds a claim on it";
     only("one_claim", "parallel {\nclaim plate { heat plate to 60 degC }\nheat plate to 80 degC\n}", held);
     only("around", "claim plate { parallel { heat plate to 60 degC; heat plate to 80 degC } }", twice);
     none("apart", "parallel {\nsequence { wait 1 min; heat plate to 60 degC }\nheat plate to 80 degC\n}");
@@ -108,7 +109,7 @@ fn one_instance_in_two_branches_is_found_where_they_meet() {
 
 #[test]
 fn claims_in_a_circle_are_found_unless_something_in_common_is_held() {
-    let circle = "error deadlock: claims of `panda` and `plate` can wait for each other for ever";
+    let circle = "error deadlock: claims of `panda` and `plate` can wait for each other forever";
     let crossed = "parallel {\nclaim plate { wait 1 s; claim panda { wait 1 s } }\nclaim panda { wait 1 s; claim plate { wait 1 s } }\n}";
     only("crossed", crossed, circle);
     let ordered = crossed.replace("claim panda { wait 1 s; claim plate {", "claim plate { wait 1 s; claim panda {");

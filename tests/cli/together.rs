@@ -199,8 +199,8 @@ fn a_robot_that_stays_in_the_way_is_named() {
     let options = RunOptions { fidelity: Fidelity::Motion, ..RunOptions::default() };
     let outcome = matterix_runtime::run::run(&program, &options, &mut Seen::default());
     let said = format!("{:?}", outcome.failure);
-    assert!(said.contains("` of `right` runs into `") && said.contains("` of `left` at ("), "{said}");
-    assert!(said.contains("it did not go away within 30 s"), "{said}");
+    assert!(said.contains("` of `right` collides with `") && said.contains("` of `left` at ("), "{said}");
+    assert!(said.contains("which did not move away within 30 s"), "{said}");
 }
 
 #[test]
@@ -219,9 +219,9 @@ fn arms_that_are_in_each_other_at_the_start_are_one_error() {
     let text = lab("    parallel {\n        move left to west\n        move right to east\n    }");
     write(&dir, "lab.mtx", text.replace("table at (500, 0) mm", "table at (400, 0) mm"));
     let near = matterixc_in(&dir, &["check", "lab.mtx", "--format", "concise"]).out;
-    assert!(!near.contains("before it goes"), "{near}");
+    assert!(!near.contains("before it moves"), "{near}");
     write(&dir, "lab.mtx", text.replace("table at (500, 0) mm", "table at (0, 0) mm"));
     let found = matterixc_in(&dir, &["check", "lab.mtx", "--format", "concise"]).out;
-    assert!(found.contains("error[overlap]: `right` and `left` are in one place"), "{found}");
+    assert!(found.contains("error[overlap]: `right` and `left` overlap"), "{found}");
     assert_eq!(found.lines().count(), 2, "{found}");
 }

@@ -127,7 +127,7 @@ fn a_limit_that_a_flow_breaks_is_a_failure_at_its_moment() {
 fn a_vessel_that_runs_dry_ends_the_run_at_that_moment() {
     let (code, text) = run_case("runs_dry.mtx", "circulate", &[]);
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("error[transfer-fraction]: `leave(loop)` takes more than there is"), "{text}");
+    assert!(text.contains("error[transfer-fraction]: `leave(loop)` removes more than `"), "{text}");
     assert!(text.contains("at 11.2702 s"), "{text}");
 }
 

@@ -42,7 +42,7 @@ fn a_word_that_is_none_of_the_state_is_reported() {
         ("option", "speed: fast", "speed: fsat", "`fsat` is not one of `slow`, `fast`"),
         ("compared", "lid == closed", "lid == down", "`down` is not one of `open`, `closed`"),
         ("member", "crate.lid == closed", "crate.lid in [open, up]", "`up` is not one of `open`, `closed`"),
-        ("is", "crate.lid == closed", "crate is clsoed", "`crate` is never `clsoed`"),
+        ("is", "crate.lid == closed", "crate is clsoed", "`crate` has no state `clsoed`"),
     ];
     slips::each(
         "box",
@@ -121,7 +121,7 @@ fn a_value_in_a_text_is_checked_where_it_stands() {
         ("empty", "{mode}", "{}", "syntax: expected a value, found `}`"),
         ("two", "{mode}", "{mode v}", "syntax: expected `as`, found `v`"),
         ("open", "{mode}", "{mode", "syntax: expected `(` or `as`, found `,`"),
-        ("close", "{mode}", "mode}", "syntax: `}` in a text stands for a value"),
+        ("close", "{mode}", "mode}", "syntax: `}` in a text starts or ends a value"),
         (
             "digits",
             "{mode}",
@@ -161,23 +161,27 @@ fn the_only_instance_that_fits_takes_a_role() {
         ended.err
     );
     assert!(run(&["--set", "plate=hp2"]).err.contains("`hp2` cannot be `plate`"));
-    assert!(run(&["--set", "plate=hp3"]).err.contains("there is no lab in which `cook` can be done"));
-    assert!(run(&["--lab", "small"]).err.contains("nothing in `small` can be `plate`"));
+    assert!(run(&["--set", "plate=hp3"]).err.contains("no lab of this file can run `cook`"));
+    assert!(run(&["--lab", "small"]).err.contains("no thing in `small` can be `plate`"));
     assert!(run(&["--lab", "bgi"]).err.contains("did you mean `big`?"));
     let both = ROLES.replace(" where plate.limits.max >= 80 degC", "");
     assert_eq!(findings("both", &both), [] as [&str; 0]);
     write(&dir, "bench.mtx", format!("mtx 1\n{both}"));
     let ended = run(&[]);
-    assert!(ended.err.contains("`cook` can be done in `small` or `big`: which one?"), "{}", ended.err);
+    assert!(ended.err.contains("`cook` can run in `small` or `big`: choose one"), "{}", ended.err);
     let ended = run(&["--lab", "big"]);
-    assert!(ended.err.contains("`plate` may be `hp1` or `hp2`: which one?"), "{}", ended.err);
+    assert!(ended.err.contains("`plate` could be `hp1` or `hp2`: choose one"), "{}", ended.err);
     assert_eq!(run(&["--lab", "big", "--set", "plate=hp2"]).code, 0);
     let nowhere = ROLES.replace(">= 80 degC", ">= 800 degC");
-    assert_eq!(only("nowhere", &nowhere), "unbound-role: there is no lab in which `cook` can be done");
+    assert_eq!(only("nowhere", &nowhere), "unbound-role: no lab of this file can run `cook`");
     let state = ROLES.replace("plate.limits.max >= 80 degC", "plate is active").replace("in any lab", "in big");
-    assert!(findings("state", &state).iter().any(|f| f.ends_with(": who takes a role is decided before the run")));
+    assert!(
+        findings("state", &state)
+            .iter()
+            .any(|f| f.ends_with(": `where` is decided before the run and cannot depend on it"))
+    );
     let elsewhere = "fn f(p: Heater where p.gain > 3 W/K) -> Power = p.power\n";
-    assert!(only("where", elsewhere).starts_with("misplaced: `where` belongs to a parameter"));
+    assert!(only("where", elsewhere).starts_with("misplaced: `where` is only for parameters"));
 }
 
 #[test]
@@ -188,7 +192,7 @@ lab bench { ambient: 22 degC, hp = IkaRetControl { limits: 0 degC .. 70 degC } a
 skill bake on(p: Heater where p.limits.max >= 80 degC) { heat p to 60 degC; stop heating p }
 workflow w in bench { bake on hp }
 ";
-    let wanted = "need-unmet: `bake on hp` cannot be done: it needs `p.limits.max >= 80 degC`";
+    let wanted = "need-unmet: `bake on hp` needs `p.limits.max >= 80 degC`, which is false here";
     assert_eq!(only("skill_where", text), wanted);
 }
 
@@ -208,7 +212,7 @@ test cold { run cook { plate: hp1 }; expect plate.temperature > 50 degC }
         "{}",
         ended.out
     );
-    assert!(ended.out.contains("`plate.temperature > 50 degC` does not hold"), "{}", ended.out);
+    assert!(ended.out.contains("`plate.temperature > 50 degC` is false"), "{}", ended.out);
     assert!(ended.out.ends_with("1 passed, 1 failed in 1 file\n"), "{}", ended.out);
     let ended = matterixc_in(&dir, &["test", "a.mtx", "--only", "warm", "--format", "json"]);
     let lines = ended.out_lines();
@@ -226,13 +230,13 @@ test cold { run cook { plate: hp1 }; expect plate.temperature > 50 degC }
 #[test]
 fn a_test_is_checked_with_its_file() {
     for (name, test, wanted) in [
-        ("nothing", "test t { }", "misplaced: `t` tests nothing"),
-        ("steps", "test t { wait 1 s }", "misplaced: a test begins with the workflow it runs"),
-        ("after", "test t { run cook; wait 1 s }", "misplaced: after the run of its workflow a test only judges"),
-        ("workflow", "test t { run cok }", "unknown-name: there is no workflow `cok`"),
+        ("nothing", "test t { }", "misplaced: the test `t` has no steps"),
+        ("steps", "test t { wait 1 s }", "misplaced: a test must start with the workflow that it runs"),
+        ("after", "test t { run cook; wait 1 s }", "misplaced: after the run of its workflow a test can only `expect`"),
+        ("workflow", "test t { run cok }", "unknown-name: unknown workflow `cok`"),
         ("parameter", "test t { run cook { plaet: hp1 } }", "unknown-parameter: `cook` has no parameter `plaet`"),
-        ("lab", "test t in bgi { wait 1 s }", "unknown-name: there is no lab `bgi`"),
-        ("run", "test t in big { run cook }", "misplaced: `run` begins a test of a workflow"),
+        ("lab", "test t in bgi { wait 1 s }", "unknown-name: unknown lab `bgi`"),
+        ("run", "test t in big { run cook }", "misplaced: `run` must be the first statement of a test"),
         (
             "expect",
             "test t { run cook; expect plate is activ }",
@@ -266,9 +270,14 @@ fn labs_hold_other_labs() {
     assert!(ended.out.contains("left.far.cup.contents: mass 10 g"), "{}", ended.out);
     let slips = [
         ("unit", "{ offset: 5 mm }", "{ offset: 5 g }", "unit-mismatch: `offset` expects Length (m), found Mass (kg)"),
-        ("option", "{ offset: 5 mm }", "{ ofset: 5 mm }", "unknown-parameter: this lab has no parameter `ofset`"),
-        ("member", "left.far.table", "left.far.tabel", "unknown-member: `left.far` holds no `tabel`"),
-        ("lab", "include pair", "include piar", "unknown-name: there is no lab `piar`"),
+        (
+            "option",
+            "{ offset: 5 mm }",
+            "{ ofset: 5 mm }",
+            "unknown-parameter: the included lab has no parameter `ofset`",
+        ),
+        ("member", "left.far.table", "left.far.tabel", "unknown-member: `left.far` has no `tabel`"),
+        ("lab", "include pair", "include piar", "unknown-name: unknown lab `piar`"),
         ("twice", "station as right", "station as left", "duplicate-name: `left` is declared twice"),
         ("ring", "station as near", "full as near", "circular: `full` includes itself"),
         ("default", " = 0 mm", "", "missing-field: `offset` has no value"),
@@ -296,7 +305,7 @@ fn the_reference_protocols_pass_their_tests() {
     // Behind `lost` nobody knows what the robot's hand still holds.
     assert!(ended.code == 0 && ended.out.ends_with("1 warning\n"), "{}", ended.out);
     assert!(
-        ended.out.starts_with("warning[unfinished]: `two_samples` can end, and `kmr` is left holding"),
+        ended.out.starts_with("warning[unfinished]: `kmr` may be left holding when `two_samples` ends"),
         "{}",
         ended.out
     );

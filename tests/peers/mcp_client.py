@@ -96,7 +96,7 @@ async def session(command, folder, mode):
         await call(client, "contents", {"text": SOUND, "line": 13})
         await call(client, "library", {"words": "hotplate stirrer"})
         await call(client, "format", {"text": SOUND})
-        await refused(client, "check", {"path": "/etc/passwd"}, "not in the folder")
+        await refused(client, "check", {"path": "/etc/passwd"}, "outside the folder")
         await refused(client, "check", {"paths": "w.mtx"}, "unknown field")
         for resource in (await client.list_resources()).resources:
             page = await client.read_resource(resource.uri)

@@ -273,7 +273,7 @@ def described(service, names):
         "<Label>degC</Label>",
         "Warms a plate and lets it be.",
         "Set it to `t` and switch its heating on.",
-        "The failure `worn_out`. To mend it: take a rest.",
+        "The failure `worn_out`. To fix it: take a rest.",
         "The IKA RET control-visc",
     ]
     lacking = [w for w in wanted if w not in text]

@@ -262,7 +262,7 @@ def driven(peer):
         if ended.returncode:
             print(ended.stderr)
         ended, _ = bound(peer, "not found", f'[plate]\nsila = "{uuid.uuid4()}"\nfingerprint = "{digest}"\n')
-        peer.verdict("one that is not there is not", ended.returncode == 1 and "is on the network" in " ".join(ended.stderr.split()), peer.last(ended))
+        peer.verdict("one that is not there is not", ended.returncode == 1 and "has no server with the UUID" in " ".join(ended.stderr.split()), peer.last(ended))
     finally:
         server.stop()
 

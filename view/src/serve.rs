@@ -46,10 +46,10 @@ impl Served {
 
 fn answer(request: &Request, page: &Arc<[u8]>) -> Answer {
     let answer = match (request.method(), request.path()) {
-        _ if !request.is_for_this_machine() => Answer::text(403, "this page is for this machine only"),
+        _ if !request.is_for_this_machine() => Answer::text(403, "this page is for this computer only"),
         ("GET" | "HEAD", "/") => Answer::new(200, "text/html; charset=utf-8", Arc::clone(page)),
-        ("GET" | "HEAD", _) => Answer::text(404, "there is only one page here, at /"),
-        _ => Answer::text(405, "there is nothing here to change").with("Allow", "GET, HEAD"),
+        ("GET" | "HEAD", _) => Answer::text(404, "page not found: the only page is at /"),
+        _ => Answer::text(405, "this page is read-only").with("Allow", "GET, HEAD"),
     };
     answer.guarded()
 }

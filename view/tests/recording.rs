@@ -167,7 +167,7 @@ fn what_is_no_recording_is_refused_in_words() {
     assert!(!is_recording(b"mtx 1\n"));
     assert_eq!(from_recording(b"mtx 1\n").expect_err("no recording").to_string(), "this is not an MCAP file");
     let empty = from_recording(&recording(&[])).expect_err("of no run").to_string();
-    assert!(empty.contains("not of a run"), "{empty}");
+    assert!(empty.contains("not the recording of a run"), "{empty}");
 }
 
 #[test]

@@ -129,7 +129,7 @@ fn carried_out(
         let whole = |bytes: &[u8]| read(bytes).map_or(bytes.len(), |Past { whole, .. }| whole as usize);
         if !room.revived(away, whole) {
             // A device that is not there is tried again a few times.
-            let is_away = ending.diagnostics.iter().any(|d| d.help.iter().any(|h| h.contains("go on with `--resume`")));
+            let is_away = ending.diagnostics.iter().any(|d| d.help.iter().any(|h| h.contains("`--resume`")));
             if !is_away || process == PROCESSES {
                 return (Some(ending), process);
             }

@@ -182,7 +182,7 @@ impl Place<'_> {
     pub(crate) fn places_of(&self, name: &str, out: &mut Offers) {
         for place in self.index.built_places(name) {
             if !out.all.iter().any(|c| c.label == place) {
-                let (text, detail) = (place.clone(), "a place of the grid".to_string());
+                let (text, detail) = (place.clone(), "a well or place".to_string());
                 out.all.push(Completion { text, label: place, kind: Offer::Place, detail, def: None, rank: 5 });
             }
         }

@@ -22,24 +22,24 @@ const OF_SPECIES: &[(&str, &str)] = &[
     ("charge", "charge number, from the formula"),
     ("splits", "whether it becomes ions in water"),
     ("ions", "the ions it becomes in water"),
-    ("count", "how many of an ion it becomes: `s.count(ion)`"),
+    ("count", "the number of an ion that it releases: `s.count(ion)`"),
 ];
 
 /// What can be asked of a reaction.
 const OF_REACTION: &[(&str, &str)] = &[
     ("species", "all species of the equation"),
     ("reactants", "the species that are consumed"),
-    ("products", "the species that are made"),
+    ("products", "the species that are formed"),
     ("orders", "the species that the rate depends on"),
-    ("unordered", "the reactants on which the rate does not depend"),
+    ("unordered", "the reactants of order 0"),
     ("limiting", "the reactants that a law of this order uses up in finite time: those without an order of 1 or more"),
     ("valid", "temperatures between which the rate law holds"),
     ("enthalpy", "energy per mole of reaction"),
     ("rate", "the rate constant at a temperature: `r.rate(T)`"),
     ("order", "the order in a species: `r.order(s)`"),
-    ("coefficient", "how much of a species the equation makes: `r.coefficient(s)`"),
-    ("basis", "what the rate counts in a mixture: `r.basis(m)`"),
-    ("requires", "whether its condition holds in a mixture: `r.requires(m)`"),
+    ("coefficient", "the coefficient of a species, negative if it is consumed: `r.coefficient(s)`"),
+    ("basis", "the quantity of a mixture that the rate refers to: `r.basis(m)`"),
+    ("requires", "whether its condition is true in a mixture: `r.requires(m)`"),
 ];
 
 /// What can be asked of a list.
@@ -61,18 +61,18 @@ const OF_GRID: &[(&str, &str)] = &[
 
 /// What can be asked of a step.
 const OF_STEP: &[(&str, &str)] =
-    &[("start", "when it began"), ("end", "when it ended"), ("elapsed", "how long it has lasted so far")];
+    &[("start", "its start time"), ("end", "its end time"), ("elapsed", "its duration so far")];
 
 /// What can be asked of a thing that counts species.
 const OF_MIXTURE: &[(&str, &str)] =
-    &[("species", "all species that can get into it"), ("basis", "what a rate counts: `m.basis`")];
+    &[("species", "all species that can get into it"), ("basis", "the quantity that a rate refers to: `m.basis`")];
 
 /// Points that every shape has.
 const OF_SHAPE: &[(&str, &str)] = &[
     ("top", "the middle of the top of its shape"),
     ("middle", "the middle of its shape"),
     ("rim", "the edge of the top of its shape in the direction of x"),
-    ("stand", "where it last stood before it was picked up"),
+    ("stand", "its last place before it was picked up"),
 ];
 
 impl Index {

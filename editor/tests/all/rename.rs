@@ -48,18 +48,18 @@ fn what_cannot_be_renamed_is_said() {
     let why = |what: &str, new: &str| rename(&[], &index, analysis.root, place(LAB, what), new).unwrap_err();
     assert_eq!(why("= |Beaker250mL on", "Cup"), "`Beaker250mL` belongs to the standard library");
     assert_eq!(why("45 deg|C", "grad"), "`degC` belongs to the standard library");
-    assert_eq!(why("std::|heating", "warming"), "`heating` is a module: it has the name of its file");
-    assert_eq!(why("look.|elapsed", "time"), "`elapsed` is a word of the language: how long it has lasted so far");
-    assert_eq!(why("lid == |open", "ajar"), "`open` is a word of a state: types are the same if their words are");
-    assert_eq!(why("|ambient: 22", "around"), "`ambient` is a setting that laws read by this name");
+    assert_eq!(why("std::|heating", "warming"), "`heating` is a module, named by its file");
+    assert_eq!(why("look.|elapsed", "time"), "`elapsed` is a word of the language: its duration so far");
+    assert_eq!(why("lid == |open", "ajar"), "`open` is a word of a state: types are equal if their words are");
+    assert_eq!(why("|ambient: 22", "around"), "laws read the setting `ambient` by this name");
     assert_eq!(why("cook(|target", "wait"), "`wait` cannot be the name of a parameter");
     assert_eq!(why("cook(|target", "2x"), "`2x` cannot be the name of a parameter");
-    assert_eq!(why("|crate = Crate", "plate"), "`plate` is the name of a thing in a lab already");
-    assert_eq!(why("cook(|target", "rise"), "`rise` is the name of a variable already");
-    assert_eq!(why("let |rise", "beaker"), "`beaker` is the name of a thing in a lab already");
-    assert_eq!(why("const |warm", "target"), "`target` is the name of a parameter already");
-    assert_eq!(why("state |lid", "mass"), "`mass` is the name of a member already");
-    assert_eq!(why("skill |bring", "heat"), "`heat` is a verb already");
+    assert_eq!(why("|crate = Crate", "plate"), "`plate` is already the name of a thing in a lab");
+    assert_eq!(why("cook(|target", "rise"), "`rise` is already the name of a variable");
+    assert_eq!(why("let |rise", "beaker"), "`beaker` is already the name of a thing in a lab");
+    assert_eq!(why("const |warm", "target"), "`target` is already the name of a parameter");
+    assert_eq!(why("state |lid", "mass"), "`mass` is already the name of a member");
+    assert_eq!(why("skill |bring", "heat"), "`heat` is already a verb");
     assert!(prepare(&index, analysis.root, 0).is_err());
 }
 

@@ -20,11 +20,10 @@ pub(super) struct Message<'s> {
 impl<'s> Message<'s> {
     /// Reads a message, or says what is wrong with the driver's text.
     pub(super) fn read(said: &'s Said) -> Result<Message<'s>, Diagnostic> {
-        let wrong = |headline: String| wrong_message(said.span, headline, format!("says `{}`", said.text));
+        let wrong = |headline: String| wrong_message(said.span, headline, format!("sends `{}`", said.text));
         let mut words = said.text.split(' ');
         let name = words.next().unwrap_or_default();
-        let form =
-            form::find(name).ok_or_else(|| wrong(format!("`{name}` is no command of Opentrons that is known here")))?;
+        let form = form::find(name).ok_or_else(|| wrong(format!("unknown Opentrons command `{name}`")))?;
         let mut fields: Vec<(&str, String)> = Vec::new();
         for word in words.filter(|w| !w.is_empty()) {
             let field = word.split_once('=').filter(|(name, _)| form.field(name).is_some());
@@ -42,11 +41,11 @@ impl<'s> Message<'s> {
         }
         for (i, (field, _)) in fields.iter().enumerate() {
             if fields[..i].iter().any(|(f, _)| f == field) {
-                return Err(wrong(format!("`{name}` says `{field}` twice")));
+                return Err(wrong(format!("`{name}` has the field `{field}` twice")));
             }
         }
         if let Some((missing, _)) = form.needs.iter().find(|(n, _)| !fields.iter().any(|(f, _)| f == n)) {
-            return Err(wrong(format!("`{name}` does not say `{missing}`")));
+            return Err(wrong(format!("`{name}` needs the field `{missing}`")));
         }
         Ok(Message { form, fields, said })
     }
@@ -58,7 +57,7 @@ impl<'s> Message<'s> {
 
     /// A finding about what it says.
     pub(super) fn wrong(&self, headline: String) -> Diagnostic {
-        wrong_message(self.said.span, headline, format!("says `{}`", self.said.text))
+        wrong_message(self.said.span, headline, format!("sends `{}`", self.said.text))
     }
 }
 

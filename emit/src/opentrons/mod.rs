@@ -21,7 +21,7 @@ use protocol::Protocol;
 pub const WIRE: &str = "opentrons";
 
 /// What the target is called in findings.
-const WHAT: &str = "a protocol of Opentrons";
+const WHAT: &str = "an Opentrons protocol";
 
 /// A JSON protocol of schema 8, with commands of schema 8.
 pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {

@@ -99,7 +99,7 @@ pub(super) fn robot<'p>(subject: Subject<'p>, performance: &Performance<'_>) -> 
     let root = program.plan.get(program.plan.root).span;
     let Some(first) = robots.first() else {
         let label = format!("`{}` has no robot with a driver over `{}`", program.scene.lab, super::WIRE);
-        return Err(not_expressible(root, format!("{WHAT} needs a robot of Opentrons"), label));
+        return Err(not_expressible(root, format!("{WHAT} needs an Opentrons robot"), label));
     };
     let origins = place::origins(&program.plan, sources);
     let mut used: Option<&Wired> = None;
@@ -112,8 +112,9 @@ pub(super) fn robot<'p>(subject: Subject<'p>, performance: &Performance<'_>) -> 
             Some(other) if other.device != own.device => {
                 let at = origins.get(act.step.0 as usize).copied().unwrap_or_default();
                 let names = [other, own].map(|w| program.scene.get(w.device).name.as_str());
-                let headline = format!("{WHAT} is for one robot, and this uses `{}` and `{}`", names[0], names[1]);
-                let d = not_expressible(at, headline, format!("is done by `{}`", names[1]));
+                let headline =
+                    format!("{WHAT} is for one robot, but this workflow uses `{}` and `{}`", names[0], names[1]);
+                let d = not_expressible(at, headline, format!("done by `{}`", names[1]));
                 return Err(d.help("write one workflow for each"));
             }
             _ => used = Some(own),

@@ -54,8 +54,8 @@ const TEMPERED: [(&str, &str, &str); 3] = [
 ];
 
 fn no_call(command: &Command) -> Diagnostic {
-    not_expressible(command.at, format!("{WHAT} in Python has no call for `{}`", command.name), "is told this")
-        .help("write it as `--target opentrons-json`")
+    not_expressible(command.at, format!("{WHAT} in Python has no call for `{}`", command.name), "this step sends it")
+        .help("use `--target opentrons-json`")
 }
 
 struct Script {

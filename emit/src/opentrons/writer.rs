@@ -70,33 +70,35 @@ impl Writer<'_, '_> {
         let (Some(said), Some(device)) = (said, operation.device) else {
             let d = match (operation.device, wired) {
                 (Some(device), Some(wired)) => {
-                    let headline = format!("{WHAT} has no command to `{}` `{}`", operation.verb, self.name(device));
-                    let help = format!("its driver `{}` has no line for it", wired.driver);
-                    not_expressible(at, headline, format!("does `{}`", step.label)).help(help)
+                    let headline =
+                        format!("{WHAT} has no command for `{}` with `{}`", operation.verb, self.name(device));
+                    let help = format!("its driver `{}` has no line for this verb", wired.driver);
+                    not_expressible(at, headline, format!("this step does `{}`", step.label)).help(help)
                 }
                 (Some(device), None) => {
                     // What is out of reach is so at every step.
-                    let reached = format!("{WHAT} does not reach `{}`", self.name(device));
+                    let reached = format!("{WHAT} cannot control `{}`", self.name(device));
                     if let Some(known) = self.found.iter_mut().find(|d| d.headline == reached) {
-                        let d = known.clone().because(at, "and here");
+                        let d = known.clone().because(at, "also here");
                         *known = d;
                         return;
                     }
-                    let headline = format!("{WHAT} does not reach `{}`", self.name(device));
+                    let headline = format!("{WHAT} cannot control `{}`", self.name(device));
                     let help = format!("`{}` has no driver over `{}`", program.scene.get(device).kind, super::WIRE);
-                    not_expressible(at, headline, format!("does `{}`", step.label)).help(help)
+                    not_expressible(at, headline, format!("this step does `{}`", step.label)).help(help)
                 }
                 (None, _) => not_expressible(
                     at,
-                    format!("{WHAT} has no command to `{}`", operation.verb),
-                    "is done by no device of it",
+                    format!("{WHAT} has no command for `{}`", operation.verb),
+                    "no device of the robot does this",
                 ),
             };
             return self.found.push(d);
         };
         if self.deck.get(device).is_none() && device != self.protocol.robot.device {
-            let headline = format!("`{}` is no part of `{}`", self.name(device), self.name(self.protocol.robot.device));
-            return self.found.push(not_expressible(at, headline, format!("does `{}`", step.label)));
+            let headline =
+                format!("`{}` is not a part of `{}`", self.name(device), self.name(self.protocol.robot.device));
+            return self.found.push(not_expressible(at, headline, format!("this step does `{}`", step.label)));
         }
         for said in said {
             match Message::read(said).and_then(|message| self.command(device, &message, at)) {
@@ -147,7 +149,7 @@ impl Writer<'_, '_> {
                 Holds::Origin if ["top", "bottom", "center"].contains(&value.as_str()) => {
                     drop(spot.insert("origin".to_owned(), value.as_str().into()))
                 }
-                Holds::Origin => return Err(message.wrong(format!("`{value}` is no place in a well"))),
+                Holds::Origin => return Err(message.wrong(format!("`{value}` is not a position in a well"))),
                 Holds::Offset => {
                     let offset = spot.entry("offset").or_insert_with(|| json!({ "x": 0, "y": 0, "z": 0 }));
                     // None is not less than none.
@@ -180,14 +182,14 @@ impl Writer<'_, '_> {
             let place = scene.find(name).and_then(|id| self.deck.well(id));
             let Some(place) = place else {
                 let headline = format!("`{name}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
-                let help = "stand it on a place of the deck or on a module there when the workflow begins";
-                return Err(not_expressible(at, headline, "goes there").help(help));
+                let help = "place it on the deck, or on a module there, before the workflow starts";
+                return Err(not_expressible(at, headline, "this step goes there").help(help));
             };
             places.push(place);
         }
         let Some(first) = places.first().cloned() else { return Err(message.wrong("it names no place".to_owned())) };
         if places.iter().any(|(labware, _)| *labware != first.0) {
-            return Err(not_expressible(at, format!("{WHAT} goes to one labware at a time"), "goes to several"));
+            return Err(not_expressible(at, format!("{WHAT} goes to one labware at a time"), "several labware"));
         }
         Ok(first)
     }
@@ -198,10 +200,10 @@ impl Writer<'_, '_> {
         let parts: Vec<&str> = uri.split('/').collect();
         let version = parts.get(2).and_then(|v| v.parse::<u64>().ok());
         let ([space, name, _], Some(version)) = (parts.as_slice(), version) else {
-            let headline = format!("it is not known as which labware Opentrons knows `{}`", instance.name);
+            let headline = format!("`{}` has no Opentrons labware definition", instance.name);
             let help =
-                format!("say it in `{}`: `definition: \"opentrons/corning_96_wellplate_360ul_flat/2\"`", instance.kind);
-            return Err(not_expressible(instance.span, headline, "has no definition").help(help));
+                format!("add it to `{}`: `definition: \"opentrons/corning_96_wellplate_360ul_flat/2\"`", instance.kind);
+            return Err(not_expressible(instance.span, headline, "no definition").help(help));
         };
         params.insert("loadName".to_owned(), (*name).into());
         params.insert("namespace".to_owned(), (*space).into());
@@ -220,9 +222,9 @@ impl Writer<'_, '_> {
         }
         if *space != OWN && !self.protocol.definitions.iter().any(|(known, _)| known == uri) {
             let Some(found) = found else {
-                let headline = format!("the definition `{uri}` of `{}` is not there", instance.name);
-                let help = "make the asset `from labware \"FILE.json\"`";
-                return Err(not_expressible(instance.span, headline, "has a definition of its own").help(help));
+                let headline = format!("the definition `{uri}` of `{}` was not found", instance.name);
+                let help = "import the asset `from labware \"FILE.json\"`";
+                return Err(not_expressible(instance.span, headline, "its own definition").help(help));
             };
             self.protocol.definitions.push((uri.to_owned(), found));
         }
@@ -232,7 +234,7 @@ impl Writer<'_, '_> {
 
 fn parsed(message: &Message<'_>, name: &str, value: &str) -> Result<f64, Diagnostic> {
     let known = value.parse::<f64>().ok().filter(|v| v.is_finite());
-    known.ok_or_else(|| message.wrong(format!("`{name}` is `{value}`, which is no number")))
+    known.ok_or_else(|| message.wrong(format!("`{name}` is `{value}`, which is not a number")))
 }
 
 fn flag(message: &Message<'_>, name: &str, value: &str) -> Result<bool, Diagnostic> {

@@ -132,7 +132,7 @@ fn gather(subject: Subject<'_>, performance: &Performance<'_>) -> Result<Vec<Tra
     if travels.is_empty() {
         return Err(vec![
             not_expressible(root, "no robot with joints moves in this workflow", "nothing to write")
-                .help("joints come with an arm of `std::robots`, or with `from urdf`"),
+                .help("use an arm of `std::robots`, or import one with `from urdf`"),
         ]);
     }
     Ok(travels)

@@ -1,4 +1,4 @@
-//! The motions of one arm of Universal Robots as a program in URScript.
+//! The motions of one arm of Universal Robots as a URScript program.
 //!
 //! Joint positions are followed with `servoj` at the times of the performance, after a `movej` to where the arm stood when it
 //! began. What the arm does not do itself, such as closing its gripper or heating a plate, is a function that asks a person;
@@ -21,7 +21,7 @@ use crate::{Subject, Written, place};
 pub const WIRE: &str = "urscript";
 
 /// What the target is called in findings.
-const WHAT: &str = "a program in URScript";
+const WHAT: &str = "a URScript program";
 
 /// How far ahead `servoj` smooths, s, and how stiffly it follows: the defaults of the URScript manual.
 const LOOK_AHEAD: f64 = 0.1;
@@ -60,7 +60,7 @@ pub fn script(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     for travel in travels.iter().filter(|t| t.owner == t.robot) {
         if others.insert(travel.robot) {
             let headline =
-                format!("{WHAT} is for one arm, and this moves `{}` and `{}`", name(arm), name(travel.robot));
+                format!("{WHAT} is for one arm, but this workflow moves `{}` and `{}`", name(arm), name(travel.robot));
             found.push(not_expressible(at(travel), headline, format!("moves `{}`", name(travel.robot))));
         }
     }
@@ -108,7 +108,7 @@ impl Script<'_> {
     fn body(&mut self, performance: &Performance<'_>, travels: &[Travel]) {
         let own: Vec<&Travel> = travels.iter().filter(|t| t.owner == self.arm).collect();
         if let Some(start) = own.first().and_then(|t| t.points.first()) {
-            self.line("# to where the arm stands when the workflow begins");
+            self.line("# to the position of the arm at the start of the workflow");
             let positions = list(&start.positions);
             self.line(&format!("movej({positions}, a=1.0, v=0.5)"));
         }
@@ -188,7 +188,7 @@ impl Script<'_> {
         let _ = writeln!(out, "# workflow {}, arm {} ({})", program.plan.workflow, arm.name, arm.kind);
         let _ = writeln!(out, "def {}():", word(&program.plan.workflow).replacen("do_", "workflow_", 1));
         if !self.functions.is_empty() {
-            out.push_str("  # what the arm does not do itself: replace the bodies by calls of your devices\n");
+            out.push_str("  # steps of other devices: replace the bodies by calls of your devices\n");
         }
         for (name, text) in &self.functions {
             let _ = write!(out, "  def {name}():\n  {text}  end\n");

@@ -104,7 +104,7 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
                 _ => Block::Other,
             };
             if let Some(law) = ["LLNL_AQUEOUS_MODEL_PARAMETERS", "SIT"].iter().find(|law| **law == keyword) {
-                let why = format!("`{law}`: this database follows a law of activity that is not known here");
+                let why = format!("`{law}`: this model of activity is not supported");
                 return Err(mistake(line, why));
             }
             if block == Block::Other && !["SOLUTION_MASTER_SPECIES", "END"].contains(&keyword) {
@@ -124,13 +124,13 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
         };
         if let Some((name, rest)) = line.option() {
             let Some(entry) = into.last_mut().filter(|_| phase.is_none()) else {
-                return Err(mistake(line, "an option stands before the first reaction"));
+                return Err(mistake(line, "an option comes before the first reaction"));
             };
             option(entry, line, &name, rest)?;
         } else if line.text.contains('=') {
             let name = phase.take();
             if block == Block::Phases && name.is_none() {
-                return Err(mistake(line, "a reaction of a phase stands without the name of the phase before it"));
+                return Err(mistake(line, "the reaction of a phase needs the name of the phase before it"));
             }
             into.push(reaction(line, name)?);
         } else if block == Block::Phases {
@@ -144,7 +144,7 @@ pub fn read(text: &str) -> Result<Database, Mistake> {
     match database.species.is_empty() && database.phases.is_empty() {
         true => Err(Mistake {
             line: 0,
-            why: "it has no block SOLUTION_SPECIES or PHASES: it is no database of PHREEQC".into(),
+            why: "it has no block SOLUTION_SPECIES or PHASES: it is not a database of PHREEQC".into(),
         }),
         false => Ok(database),
     }
@@ -206,7 +206,7 @@ fn enthalpy(line: Line<'_>, rest: &str) -> Result<f64, Mistake> {
         "j" | "joules" => 1.0,
         "kcal" | "kcalories" => 1e3 * CALORIE,
         "cal" | "calories" => CALORIE,
-        other => return Err(mistake(line, format!("`{other}` is no unit of an enthalpy: kJ, J, kcal or cal"))),
+        other => return Err(mistake(line, format!("`{other}` is not a unit of enthalpy: use kJ, J, kcal or cal"))),
     };
     Ok(number * factor)
 }
@@ -218,7 +218,7 @@ fn reaction(line: Line<'_>, phase: Option<Line<'_>>) -> Result<Entry, Mistake> {
     let defined = sides[1].first().map(|(_, name)| name.clone());
     let name = match phase {
         Some(line) => line.text.split_whitespace().next().unwrap_or_default().to_owned(),
-        None => defined.ok_or_else(|| mistake(line, "a reaction defines nothing"))?,
+        None => defined.ok_or_else(|| mistake(line, "a reaction defines no species"))?,
     };
     Ok(Entry {
         name,
@@ -244,7 +244,7 @@ fn side(line: Line<'_>, text: &str) -> Result<Vec<(f64, String)>, Mistake> {
             _ => {
                 let digits = word.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(word.len());
                 if digits > 0 {
-                    factor = word[..digits].parse().map_err(|_| mistake(line, format!("`{word}` is no number")))?;
+                    factor = word[..digits].parse().map_err(|_| mistake(line, format!("`{word}` is not a number")))?;
                 }
                 if digits < word.len() {
                     all.push((sign * factor, word[digits..].to_owned()));

@@ -96,7 +96,7 @@ impl Block {
                 Ok(())
             }
             Some(Under::Unread) => Ok(()),
-            None => Err(Mistake { line: line.number, why: "a number stands before the first option".into() }),
+            None => Err(Mistake { line: line.number, why: "a number comes before the first option".into() }),
         }
     }
 

@@ -64,10 +64,10 @@ fn a_module_has_what_the_database_says() {
     assert_eq!(
         left,
         [
-            ("Fe+3", "its reaction has electrons"),
-            ("Gypsum", "it was not asked for among the phases"),
+            ("Fe+3", "its reaction contains electrons"),
+            ("Gypsum", "it is not among the requested phases"),
             ("CO2(g)", "it is a gas"),
-            ("EXCHANGE_SPECIES", "this kind of block is not imported")
+            ("EXCHANGE_SPECIES", "blocks of this kind are not imported")
         ]
     );
 }
@@ -88,7 +88,7 @@ fn what_cannot_be_read_is_said_with_its_line() {
     assert_eq!(wrong("SOLUTION_SPECIES\nH+ is H+\n").line, 2);
     assert_eq!(wrong("PHASES\nCaCO3 = CO3-2 + Ca+2\n").line, 2);
     assert_eq!(wrong("LLNL_AQUEOUS_MODEL_PARAMETERS\n-temperatures\nSOLUTION_SPECIES\nH+ = H+\n").line, 1);
-    assert!(wrong("hello\n").why.contains("no database"));
+    assert!(wrong("hello\n").why.contains("not a database"));
     assert!(import(SMALL, "x", &wanted(&["Quartz"])).unwrap_err().why.contains("no phase `Quartz`"));
 }
 

@@ -27,13 +27,13 @@ pub fn module(database: &Database, title: &str, wanted: &Wanted) -> Result<Impor
     writer.solids(database, wanted);
     writer.interactions(database, wanted);
     for (line, keyword) in &database.others {
-        writer.leave_out(*line, keyword, "this kind of block is not imported");
+        writer.leave_out(*line, keyword, "blocks of this kind are not imported");
     }
     writer.left_out.sort_by_key(|left| left.line);
     let text = writer.text(title);
     let text = format(FileId(0), &text).map_err(|found| {
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
-        Mistake { line: 0, why: format!("what it makes cannot be read: {why}") }
+        Mistake { line: 0, why: format!("the written file cannot be read: {why}") }
     })?;
     Ok(Imported { text, left_out: writer.left_out, files: Vec::new() })
 }
@@ -63,7 +63,7 @@ impl Writer {
         let declared: Vec<&Entry> = defined.filter(|entry| self.declare(entry, wanted)).collect();
         for entry in declared.into_iter().filter(|entry| !entry.is_master()) {
             if entry.species().any(|s| s == "e-") {
-                self.leave_out(entry.line, &entry.name, "its reaction has electrons");
+                self.leave_out(entry.line, &entry.name, "its reaction contains electrons");
                 continue;
             }
             let Some(sides) = self.sides(entry, None) else { continue };
@@ -77,7 +77,7 @@ impl Writer {
     /// Declares the species that an entry defines, where the library has none; false where it cannot be had.
     fn declare(&mut self, entry: &Entry, wanted: &Wanted) -> bool {
         let Some(formula) = names::formula(&entry.name) else {
-            self.leave_out(entry.line, &entry.name, "its formula has symbols of no element");
+            self.leave_out(entry.line, &entry.name, "its formula contains symbols that are not elements");
             return false;
         };
         if !is_wanted(&formula, wanted) {
@@ -116,12 +116,12 @@ impl Writer {
                 continue;
             }
             if !wanted.phases.contains(&phase.name) {
-                self.leave_out(phase.line, &phase.name, "it was not asked for among the phases");
+                self.leave_out(phase.line, &phase.name, "it is not among the requested phases");
                 continue;
             }
             let Some((_, text)) = phase.sides[0].first() else { continue };
             if names::formula(text).is_none() {
-                self.leave_out(phase.line, &phase.name, "its formula has symbols of no element");
+                self.leave_out(phase.line, &phase.name, "its formula contains symbols that are not elements");
                 continue;
             }
             let solid = format!("{}(s)", names::word(&phase.name));
@@ -241,13 +241,13 @@ impl Writer {
             out,
             "//! Equilibria of {title}, a database of PHREEQC (Parkhurst and Appelo, U.S. Geological Survey).\n//!"
         );
-        out.push_str("//! Constants are at 25 degC and an ionic strength of 0. A species that the library has not has the volume of the database, or\n");
-        out.push_str("//! none where that gives none; its heat capacity counts as 0, for the database has none.\n");
+        out.push_str("//! Constants are at 25 degC and an ionic strength of 0. A species that the library lacks has the volume of the\n");
+        out.push_str("//! database, or none if the database gives none; its heat capacity counts as 0, because the database has none.\n");
         if !self.without_activity.is_empty() {
             let names: BTreeSet<&String> = self.without_activity.iter().collect();
             let names: Vec<&str> = names.into_iter().map(String::as_str).collect();
             out.push_str(
-                "//!\n//! The database has numbers for activity coefficients of these, and the library none:\n",
+                "//!\n//! The database has activity coefficients of these species, but the library does not:\n",
             );
             let mut line = String::from("//!");
             for name in names {

@@ -136,7 +136,7 @@ impl Form {
                 [number] => number.parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0),
                 _ => None,
             };
-            let factor = factor.ok_or("after `*` or `/` stands one number above 0")?;
+            let factor = factor.ok_or("`*` or `/` needs one number above 0 after it")?;
             scale = if words[at] == "*" { factor } else { 1.0 / factor };
             words.truncate(at);
         }
@@ -144,11 +144,11 @@ impl Form {
             [] => Encoding::Decimal { digits: None, width: None, zeros: false, plus: false },
             [count, "digits"] => match count.parse::<u8>() {
                 Ok(count @ 1..=15) => Encoding::Significant(count),
-                _ => return Err("a number has 1 to 15 digits".to_owned()),
+                _ => return Err("a number may have 1 to 15 digits".to_owned()),
             },
             ["bcd", digits, rest @ ..] => bcd(digits, rest)?,
-            ["hex", ..] => return Err("how many bytes are written as hexadecimal digits is not said".to_owned()),
-            ["bcd"] => return Err("how many digits are coded is not said, as in `bcd 4`".to_owned()),
+            ["hex", ..] => return Err("`hex` needs the number of bytes before it".to_owned()),
+            ["bcd"] => return Err("`bcd` needs the number of digits, as in `bcd 4`".to_owned()),
             [only] if only.starts_with(['+', '.']) || only.starts_with(|c: char| c.is_ascii_digit()) => decimal(only)?,
             [kind, rest @ ..] => bytes(kind, rest, registers)?,
         };
@@ -222,13 +222,13 @@ impl Form {
             return Ok(text);
         }
         let is = unit.show(unit.to_si(read.number));
-        Err(format!("it would be {is} there, as its form has too few digits"))
+        Err(format!("it would become {is}, because the format has too few digits"))
     }
 
     /// A number in this form; in words why it has none.
     pub fn write(&self, number: f64) -> Result<String, String> {
         if !number.is_finite() {
-            return Err("it is no number".to_owned());
+            return Err("it is not a number".to_owned());
         }
         let scaled = number * self.scale;
         match self.encoding {
@@ -378,7 +378,7 @@ fn parsed(text: &str) -> Option<(f64, f64)> {
 
 /// `+06.2`: a sign, whether zeros fill it up, characters in all, digits after the point.
 fn decimal(text: &str) -> Result<Encoding, String> {
-    let not_one = || format!("`{text}` is no form of a number: as in `.1`, `06.2` or `+.3`");
+    let not_one = || format!("`{text}` is not a format of a number: write it as in `.1`, `06.2` or `+.3`");
     let rest = text.strip_prefix('+').unwrap_or(text);
     let (whole, digits) = rest.split_once('.').map_or((rest, None), |(whole, digits)| (whole, Some(digits)));
     let number = |t: &str| t.parse::<u8>().ok().filter(|_| t.bytes().all(|b| b.is_ascii_digit()));
@@ -386,18 +386,18 @@ fn decimal(text: &str) -> Result<Encoding, String> {
     let zeros = whole.len() > 1 && whole.starts_with('0');
     let width = if whole.is_empty() { None } else { Some(number(whole).ok_or_else(not_one)?) };
     if width.is_some_and(|w| !(1..=WIDEST).contains(&w)) {
-        return Err(format!("a number has 1 to {WIDEST} characters"));
+        return Err(format!("a number may have 1 to {WIDEST} characters"));
     }
     let least = digits.map_or(1, |d| d + 1 + u8::from(d > 0)) + u8::from(text.starts_with('+'));
     if let Some(width) = width.filter(|w| *w < least) {
-        return Err(format!("{width} characters have no room for a number like this: it has {least} at least"));
+        return Err(format!("a number like this needs at least {least} characters, not {width}"));
     }
     Ok(Encoding::Decimal { digits, width, zeros, plus: text.starts_with('+') })
 }
 
 fn bcd(digits: &str, rest: &[&str]) -> Result<Encoding, String> {
     let count = digits.parse::<u8>().ok().filter(|d| (2..=14).contains(d) && d % 2 == 0);
-    let count = count.ok_or("two digits stand in each byte: `bcd 2` to `bcd 14`, an even number")?;
+    let count = count.ok_or("each byte holds two digits: write `bcd 2` to `bcd 14`, an even number")?;
     let (order, hex) = order(rest, true, 1)?;
     Ok(Encoding::Bcd { size: count / 2, order, hex })
 }
@@ -414,8 +414,7 @@ fn bytes(kind: &str, rest: &[&str], registers: bool) -> Result<Encoding, String>
         "f64" => (Kind::Float, 8),
         other => {
             return Err(format!(
-                "`{other}` is no form of a number: as in `.1`, `05.1`, `+.2`, `4 digits`, `u8`, `i16 big`, `u32 little`, `f32 swapped`, \
-                 `u16 hex` or `bcd 4`"
+                "`{other}` is not a format of a number: write it as in `.1`, `05.1`, `+.2`, `4 digits`, `u8`, `i16 big`, `u32 little`, `f32 swapped`, `u16 hex` or `bcd 4`"
             ));
         }
     };
@@ -432,18 +431,18 @@ fn order(words: &[&str], known: bool, size: u8) -> Result<(Order, Hex), String> 
             "hex" => hex = Hex::Upper,
             "lower" if hex == Hex::Upper => hex = Hex::Lower,
             "big" | "little" | "swapped" => orders.push(*word),
-            other => return Err(format!("`{other}` says nothing of bytes: as in `big`, `little`, `swapped`, `hex`")),
+            other => return Err(format!("`{other}` does not describe bytes: use `big`, `little`, `swapped` or `hex`")),
         }
     }
     let order = match orders.as_slice() {
         [] if size > 1 && !known && hex == Hex::No => {
-            return Err("which byte comes first is not said: `big`, the highest, or `little`, the lowest".to_owned());
+            return Err("the byte order is missing: `big` sends the highest byte first, `little` the lowest".to_owned());
         }
         [] | ["big"] => Order::Big,
         ["little"] => Order::Little,
         ["swapped"] | ["big", "swapped"] | ["swapped", "big"] if size >= 4 => Order::BigSwapped,
         ["little", "swapped"] | ["swapped", "little"] if size >= 4 => Order::LittleSwapped,
-        other => return Err(format!("`{}` is no order of {size} bytes", other.join(" "))),
+        other => return Err(format!("`{}` is not an order of {size} bytes", other.join(" "))),
     };
     Ok((order, hex))
 }
@@ -494,7 +493,7 @@ fn within(scaled: f64, low: f64, high: f64) -> Result<f64, String> {
     if (low..=high.min(EXACT)).contains(&whole) {
         return Ok(whole);
     }
-    Err(format!("{} is not within {} to {}", show_number(scaled), show_number(low), show_number(high)))
+    Err(format!("{} is outside {} to {}", show_number(scaled), show_number(low), show_number(high)))
 }
 
 /// Digits after the point of a number that has so many in all, three at most; none where it has more before the point.
@@ -587,7 +586,7 @@ mod tests {
             ("4 digits", 3e-4),
         ] {
             let why = put(text, &ml, number).expect_err(text);
-            assert!(why.contains("it would be"), "{text} {number}: {why}");
+            assert!(why.contains("it would become"), "{text} {number}: {why}");
         }
         for (text, number, sent) in [
             ("06.3", 0.0, "00.000"),

@@ -102,16 +102,19 @@ fn is_hidden(c: char) -> bool {
 fn finding(file: FileId, start: usize, hidden: &[(usize, char)]) -> Option<Diagnostic> {
     let first = hidden.iter().find(|(_, c)| hides(*c)).or(hidden.first())?;
     let span = |(at, c): &(usize, char)| Span::new(file, start + at, start + at + c.len_utf8());
-    let headline =
-        format!("a hidden character (U+{:04X}, {}) changes how this is shown", u32::from(first.1), name(first.1));
+    let headline = format!(
+        "a hidden character (U+{:04X}, {}) changes how this line is displayed",
+        u32::from(first.1),
+        name(first.1)
+    );
     let label = match hidden.len() {
         1 => "here".to_owned(),
-        n => format!("here; {n} of them on this line"),
+        n => format!("here; {n} on this line"),
     };
     let report = if hides(first.1) { Diagnostic::error } else { Diagnostic::warning };
     let mut found = report(codes::HIDDEN_CHARACTER, span(first), headline, label)
-        .help("what is shown may not be what is read: look at the line again and remove what is hidden")
-        .guess("remove what is hidden", span(first), "");
+        .help("the program may read the line differently from its display: remove the hidden characters and read it again")
+        .guess("remove the hidden characters", span(first), "");
     if let Some(fix) = found.fixes.last_mut() {
         fix.edits = hidden.iter().map(|one| Edit { span: span(one), text: String::new() }).collect();
     }

@@ -149,7 +149,7 @@ pub fn of_shapes<'s>(mass: f64, shapes: impl IntoIterator<Item = (&'s Shape, Pos
 pub fn impossible([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Option<&'static str> {
     let sum = xx + yy + zz;
     if [xx, yy, zz].iter().any(|m| *m <= 0.0) || !sum.is_finite() {
-        return Some("a moment of inertia is above zero");
+        return Some("a moment of inertia must be above zero");
     }
     let is_semidefinite = |m: [f64; 6], slack: f64| {
         let [a, b, c, d, e, f] = m;
@@ -160,11 +160,11 @@ pub fn impossible([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Option<&'static str> {
             && whole >= -slack * sum * sum * sum
     };
     if !is_semidefinite([xx, xy, xz, yy, yz, zz], 0.0) {
-        return Some("its products are too great for its moments: it is not positive definite");
+        return Some("its products are too large for its moments: it is not positive definite");
     }
     let half = sum / 2.0;
     if !is_semidefinite([half - xx, -xy, -xz, half - yy, -yz, half - zz], ROUNDING) {
-        return Some("no principal moment is above the sum of the two others");
+        return Some("a principal moment cannot be above the sum of the two others");
     }
     None
 }

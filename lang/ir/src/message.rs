@@ -49,13 +49,13 @@ pub struct Answer<'t> {
 pub fn request(text: &str) -> Result<Request<'_>, String> {
     let words = words(text)?;
     let (Some(method), Some(target)) = (words.first().copied(), words.get(1).copied()) else {
-        return Err("a request is a method and a path, as in `GET /health`".to_owned());
+        return Err("write a request as a method and a path, as in `GET /health`".to_owned());
     };
     if !METHODS.contains(&method) {
-        return Err(format!("`{method}` is no method: it is one of {}", METHODS.join(", ")));
+        return Err(format!("`{method}` is not a method: use one of {}", METHODS.join(", ")));
     }
     if !target.starts_with('/') || target.contains('=') && !target.contains('?') {
-        return Err(format!("`{target}` is no path, which begins with `/`"));
+        return Err(format!("`{target}` is not a path: a path starts with `/`"));
     }
     let rest = words.get(2..).unwrap_or_default();
     if let [only] = rest
@@ -93,7 +93,7 @@ fn fields<'t>(words: &[&'t str]) -> Result<Vec<Field<'t>>, String> {
 
 /// A member; `before` is the pointer of the one before it.
 fn field<'t>(word: &'t str, before: Option<&str>) -> Result<Field<'t>, String> {
-    let wrong = || format!("`{word}` is no member of a body, as in `/data/volume=100`");
+    let wrong = || format!("`{word}` is not a member of a body, as in `/data/volume=100`");
     let (own, value) = word.split_once('=').filter(|(p, _)| !p.is_empty()).ok_or_else(wrong)?;
     let beside = before.and_then(|b| b.rsplit_once('/')).map(|(above, _)| format!("{above}/{own}"));
     let whole = own.starts_with('/').then(|| own.to_owned());

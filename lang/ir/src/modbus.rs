@@ -85,8 +85,8 @@ impl Values {
             return Ok(Values::Bits(text.split_whitespace().map(bit).collect::<Result<_, _>>()?));
         }
         let digits = text.strip_prefix(HEX).filter(|d| d.len() % 4 == 0 && d.bytes().all(|b| b.is_ascii_hexdigit()));
-        let digits =
-            digits.ok_or_else(|| format!("`{text}` is not what registers hold: four hexadecimal digits each"))?;
+        let digits = digits
+            .ok_or_else(|| format!("`{text}` is not a value of registers: write four hexadecimal digits for each"))?;
         let byte = |at: usize| u8::from_str_radix(&digits[at..at + 2], 16).map_err(|e| e.to_string());
         Ok(Values::Bytes((0..digits.len()).step_by(2).map(byte).collect::<Result<_, _>>()?))
     }
@@ -129,10 +129,10 @@ impl Request {
             Some((what, values)) => (what, Some(values)),
             None => (text, None),
         };
-        let form = "as in `read 2 holding registers at 100` or `write coil at 5: on`";
-        let (verb, rest) = what.split_once(' ').ok_or_else(|| format!("this is no request of Modbus: {form}"))?;
-        let (objects, address) = rest.split_once(" at ").ok_or_else(|| format!("where is not said: {form}"))?;
-        let address = address.parse::<u16>().map_err(|_| format!("`{address}` is no address: 0 to 65535"))?;
+        let form = "write it as in `read 2 holding registers at 100` or `write coil at 5: on`";
+        let (verb, rest) = what.split_once(' ').ok_or_else(|| format!("this is not a request of Modbus: {form}"))?;
+        let (objects, address) = rest.split_once(" at ").ok_or_else(|| format!("the address is missing: {form}"))?;
+        let address = address.parse::<u16>().map_err(|_| format!("`{address}` is not an address from 0 to 65535"))?;
         let (count, name) = match objects.split_once(' ') {
             Some((count, name)) if count.bytes().all(|b| b.is_ascii_digit()) => (Some(count), name),
             _ => (None, objects),
@@ -143,15 +143,15 @@ impl Request {
         };
         let object = OBJECTS.iter().find(named).map(|(object, _)| *object);
         let object = object.ok_or_else(|| {
-            format!("`{objects}` is nothing that Modbus has: `coil`, `discrete input`, `holding register`, `input register`; with a number `2 coils`")
+            format!("`{objects}` is not an object of Modbus: use `coil`, `discrete input`, `holding register` or `input register`; with a number `2 coils`")
         })?;
         let count = count.map(|c| c.parse::<u16>().map_err(|_| format!("`{c}` is too many"))).transpose()?;
         let values = match (verb, values) {
             ("read", None) => None,
-            ("read", Some(_)) => return Err("what is read has no value behind it".to_owned()),
-            ("write", None) => return Err(format!("what is written is not said: {form}")),
+            ("read", Some(_)) => return Err("a read request takes no value".to_owned()),
+            ("write", None) => return Err(format!("the values to write are missing: {form}")),
             ("write", Some(_)) if matches!(object, Object::DiscreteInput | Object::InputRegister) => {
-                return Err(format!("an {} can be read only", object.name().replace("discrete ", "")));
+                return Err(format!("an {} is read-only", object.name().replace("discrete ", "")));
             }
             ("write", Some(values)) => Some(Values::parse(values, object)?),
             (other, _) => return Err(format!("Modbus cannot `{other}`: {form}")),
@@ -160,10 +160,10 @@ impl Request {
         let most = if values.is_some() { writes } else { reads };
         let number = count.unwrap_or(1);
         if !(1..=most).contains(&number) || u32::from(address) + u32::from(number) > 65_536 {
-            return Err(format!("{number} {}s at {address} cannot be asked for at once: 1 to {most}", object.name()));
+            return Err(format!("one request can cover 1 to {most} {}s, not {number} at {address}", object.name()));
         }
         if let Some(values) = values.as_ref().filter(|v| v.count() != usize::from(number)) {
-            return Err(format!("{} values are written to {number}: one for each", values.count()));
+            return Err(format!("{} values are given for {number}: give one for each", values.count()));
         }
         Ok(Request { object, count, address, values })
     }
@@ -200,7 +200,7 @@ pub fn exception(code: u8) -> &'static str {
         2 => "illegal data address",
         3 => "illegal data value",
         4 => "server device failure",
-        5 => "acknowledge: it goes on with it",
+        5 => "acknowledge: the device is still working on it",
         6 => "server device busy",
         8 => "memory parity error",
         10 => "gateway path unavailable",

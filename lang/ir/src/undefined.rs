@@ -21,11 +21,11 @@ const MOST_NAMED: usize = 6;
 /// Why an operation has no value, in words.
 pub fn why(graph: &Graph, operation: NodeId) -> String {
     let text = match graph.op(operation) {
-        Op::Binary(BinaryOp::Div, ..) => "something is divided by 0",
-        Op::Unary(UnaryOp::Sqrt, _) => "the root of a number below 0",
-        Op::Unary(UnaryOp::Ln, _) => "the logarithm of a number that is not above 0",
-        Op::Binary(BinaryOp::Pow, ..) => "a power that no number is",
-        Op::Select(..) => "a table is read beyond its first or last point",
+        Op::Binary(BinaryOp::Div, ..) => "division by 0",
+        Op::Unary(UnaryOp::Sqrt, _) => "square root of a negative number",
+        Op::Unary(UnaryOp::Ln, _) => "logarithm of 0 or of a negative number",
+        Op::Binary(BinaryOp::Pow, ..) => "a power without a real value",
+        Op::Select(..) => "a table is read outside its first and last point",
         Op::Solved(call, _) => {
             let equations = graph.call(call).system.equations();
             let mut names: Vec<String> = equations.iter().map(|e| format!("`{}`", e.name)).collect();
@@ -34,12 +34,12 @@ pub fn why(graph: &Graph, operation: NodeId) -> String {
                 names.push(format!("{more} more"));
             }
             return match names.as_slice() {
-                [] => "no amounts meet the equilibria".into(),
+                [] => "no amounts satisfy the equilibria".into(),
                 [one] => format!("no amounts meet the equilibrium {one}"),
-                all => format!("no amounts meet the equilibria {} together", joined(all, "and")),
+                all => format!("no amounts satisfy the equilibria {} together", joined(all, "and")),
             };
         }
-        _ => "it is too large, or endless less endless",
+        _ => "the value is too large, or infinity minus infinity",
     };
     text.into()
 }

@@ -28,7 +28,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Surface, String> {
 
 /// The file, valid by its standard. Attributes are looked at first, as the validation takes their accessors to be there.
 fn file(bytes: &[u8]) -> Result<Gltf, String> {
-    let wrong = |e: gltf::Error| format!("it is no glTF: {e}");
+    let wrong = |e: gltf::Error| format!("it is not a glTF file: {e}");
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(wrong)?;
     let root = document.into_json();
     let mut attributes = root.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
@@ -52,7 +52,7 @@ fn buffers(file: &Gltf) -> Result<Vec<Vec<u8>>, String> {
         Source::Bin => file.blob.clone().ok_or_else(|| "its binary part is missing".to_string()),
         Source::Uri(uri) => {
             let coded = uri.strip_prefix("data:").and_then(|rest| rest.split_once(";base64,")).map(|(_, coded)| coded);
-            let coded = coded.ok_or_else(|| format!("its data lies in another file, `{uri}`: save it as `.glb`"))?;
+            let coded = coded.ok_or_else(|| format!("its data is in another file, `{uri}`: save it as `.glb`"))?;
             base64::engine::general_purpose::STANDARD.decode(coded).map_err(|e| format!("its data is damaged: {e}"))
         }
     };
@@ -63,7 +63,7 @@ fn buffers(file: &Gltf) -> Result<Vec<Vec<u8>>, String> {
 fn fits(document: &Document, buffers: &[Vec<u8>]) -> Result<(), String> {
     for accessor in document.accessors() {
         let (Some(view), None) = (accessor.view(), accessor.sparse()) else {
-            return Err("it has sparse data, which is not read".to_string());
+            return Err("it has sparse data, which is not supported".to_string());
         };
         let there = buffers.get(view.buffer().index()).map_or(0, Vec::len);
         let within = view.offset().checked_add(view.length()).is_some_and(|end| end <= there);
@@ -79,7 +79,7 @@ fn fits(document: &Document, buffers: &[Vec<u8>]) -> Result<(), String> {
 
 fn add(node: &Node<'_>, above: Matrix, depth: u32, buffers: &[Vec<u8>], out: &mut Surface) -> Result<(), String> {
     if depth > DEEPEST {
-        return Err(format!("its nodes lie more than {DEEPEST} deep"));
+        return Err(format!("its nodes are nested more than {DEEPEST} deep"));
     }
     let matrix = product(&above, &node.transform().matrix().map(|column| column.map(f64::from)));
     for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives).filter(|p| p.mode() == Mode::Triangles) {

@@ -36,7 +36,7 @@ mod usd {
     use crate::Surface;
 
     pub(crate) fn read(_: &[u8]) -> Result<Surface, String> {
-        Err("this program was built without USD: `cargo install --features usd` builds it with".to_string())
+        Err("this program was built without USD: build it with `cargo install --features usd`".to_string())
     }
 
     pub(crate) use {read as usd, read as usda, read as usdc, read as usdz};
@@ -62,7 +62,7 @@ fn kind(name: &str) -> Option<&'static Kind> {
 pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
     let Some((.., read)) = kind(name) else {
         return Err(
-            "meshes are read from `.stl`, `.obj`, `.glb`, `.gltf` and `.usd`, `.usda`, `.usdc`, `.usdz`".to_string()
+            "supported formats are `.stl`, `.obj`, `.glb`, `.gltf` and `.usd`, `.usda`, `.usdc`, `.usdz`".to_string()
         );
     };
     if bytes.len() > MOST_BYTES {
@@ -77,10 +77,10 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
     }
     let mesh = Mesh { name: name.to_string(), points, triangles };
     if !mesh.is_sound() {
-        return Err("a corner of a triangle is not there, or is no number".to_string());
+        return Err("a corner of a triangle is missing, or not a number".to_string());
     }
     if mesh.size().contains(&0.0) {
-        return Err("it is flat: a body has a volume".to_string());
+        return Err("it is flat: a body needs a volume".to_string());
     }
     Ok(mesh)
 }

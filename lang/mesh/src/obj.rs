@@ -9,7 +9,7 @@ use crate::Surface;
 pub(crate) fn read(bytes: &[u8]) -> Result<Surface, String> {
     let options = LoadOptions { triangulate: true, single_index: true, ..LoadOptions::default() };
     let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |_| Ok(Default::default()));
-    let (models, _) = loaded.map_err(|e| format!("it is no OBJ: {e}"))?;
+    let (models, _) = loaded.map_err(|e| format!("it is not an OBJ file: {e}"))?;
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for model in models {
         let first = points.len() as u32;

@@ -14,7 +14,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Surface, String> {
     let binary = count.is_some_and(|n| bytes.len() as u64 == HEADER as u64 + TRIANGLE as u64 * u64::from(n));
     if !binary && !bytes.trim_ascii_start().starts_with(b"solid") {
         return Err(
-            "it is no STL: neither a text that begins with `solid`, nor as long as its triangles are".to_string()
+            "it is not an STL file: it neither starts with `solid` nor has the length of its triangles".to_string()
         );
     }
     let mut bytes = bytes.to_vec();
@@ -24,7 +24,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Surface, String> {
         }
         bytes[..80].fill(0);
     }
-    let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| format!("it is no STL: {e}"))?;
+    let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| format!("it is not an STL file: {e}"))?;
     let points = mesh.vertices.iter().map(|v| [0, 1, 2].map(|k| f64::from(v[k]))).collect();
     let triangles = mesh.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect();
     Ok((points, triangles))

@@ -39,17 +39,17 @@ pub(crate) fn usdz(bytes: &[u8]) -> Result<Surface, String> {
 fn read(name: &'static str, bytes: &[u8]) -> Result<Surface, String> {
     // The library expects files to be whole.
     let caught = std::panic::catch_unwind(|| surface(name, bytes));
-    caught.unwrap_or_else(|_| Err("it is no USD, or one that the library for it cannot read".to_string()))
+    caught.unwrap_or_else(|_| Err("it is not a USD file, or not a supported one".to_string()))
 }
 
 fn surface(name: &'static str, bytes: &[u8]) -> Result<Surface, String> {
-    let wrong = |e: &dyn std::fmt::Display| format!("it is no USD: {e:#}");
+    let wrong = |e: &dyn std::fmt::Display| format!("it is not a USD file: {e:#}");
     let only = Only { name, bytes: bytes.to_vec() };
     let stage = Stage::builder().resolver(only).open(name).map_err(|e| wrong(&e))?;
     let mut paths = Vec::new();
     stage.traverse(PrimPredicate::DEFAULT_PROXIES, |path| paths.push(path.clone())).map_err(|e| wrong(&e))?;
     if let Some(error) = stage.composition_errors().first() {
-        return Err(format!("it refers to what is not in it: {error}"));
+        return Err(format!("it refers to something that it does not contain: {error}"));
     }
     let mut out = (Vec::new(), Vec::new());
     for path in paths {

@@ -86,13 +86,13 @@ fn one_body_is_the_same_from_all_kinds_of_files() {
 fn what_is_wrong_is_said() {
     let flat = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let cases: [(&str, &[u8], &str); 7] = [
-        ("a.dae", b"", "meshes are read from"),
-        ("a.stl", b"hello", "neither a text that begins with `solid`"),
-        ("a.stl", b"solid x\nfacet normal 0 0", "it is no STL"),
-        ("a.obj", b"v 0 0\nf 1 2 3\n", "it is no OBJ"),
+        ("a.dae", b"", "supported formats are"),
+        ("a.stl", b"hello", "neither starts with `solid`"),
+        ("a.stl", b"solid x\nfacet normal 0 0", "it is not an STL file"),
+        ("a.obj", b"v 0 0\nf 1 2 3\n", "it is not an OBJ file"),
         ("a.obj", b"# nothing\n", "no triangles"),
         ("a.obj", flat, "flat"),
-        ("a.gltf", b"{}", "it is no glTF"),
+        ("a.gltf", b"{}", "it is not a glTF file"),
     ];
     for (name, bytes, expected) in cases {
         let said = read(name, bytes).expect_err(name);
@@ -165,9 +165,9 @@ mod usd {
         let elsewhere = b"#usda 1.0\n(\n    subLayers = [@other.usda@]\n)\n";
         let short = b"#usda 1.0\ndef Mesh \"m\"\n{\n    int[] faceVertexCounts = [3]\n    int[] faceVertexIndices = [0, 1]\n    point3f[] points = [(0, 0, 0)]\n}\n";
         let cases: [(&str, &[u8], &str); 5] = [
-            ("a.usda", b"hello", "no USD"),
-            ("a.usdc", b"PXR-USDC", "no USD"),
-            ("a.usdz", b"PK", "no USD"),
+            ("a.usda", b"hello", "not a USD file"),
+            ("a.usdc", b"PXR-USDC", "not a USD file"),
+            ("a.usdz", b"PK", "not a USD file"),
             ("a.usda", elsewhere, "other.usda"),
             ("a.usda", short, "lacks corners"),
         ];

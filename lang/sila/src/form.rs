@@ -121,10 +121,8 @@ fn plain(text: &str) -> Option<String> {
 pub fn difference(promised: &[(String, String)], offered: &[(String, String)]) -> Option<String> {
     promised.iter().find_map(|(name, ty)| match offered.iter().find(|(other, _)| other == name) {
         Some((_, other)) if other == ty => None,
-        Some((_, other)) => {
-            Some(format!("`{name}` is `{other}` there, and `{ty}` in the definition that was imported"))
-        }
-        None => Some(format!("`{name}` is not there, and in the definition that was imported")),
+        Some((_, other)) => Some(format!("`{name}` is `{other}` on the server, but `{ty}` in the imported definition")),
+        None => Some(format!("the server has no `{name}`, but the imported definition does")),
     })
 }
 

@@ -74,12 +74,12 @@ pub fn read(text: &str) -> Result<Feature, Problem> {
         if !word.starts_with(|c: char| c.is_ascii_lowercase())
             || !word.chars().all(|c| c.is_ascii_lowercase() || c == '.')
         {
-            return Err(wrong(root, format!("`{word}` is not of lower case letters and points")));
+            return Err(wrong(root, format!("`{word}` may contain only lower case letters and points")));
         }
     }
     let version = attribute("FeatureVersion").ok_or_else(|| wrong(root, "the feature has no `FeatureVersion`"))?;
     let version = version.split_once('.').and_then(|(major, minor)| Some((major.parse().ok()?, minor.parse().ok()?)));
-    let version = version.ok_or_else(|| wrong(root, "a `FeatureVersion` is written as in `1.0`"))?;
+    let version = version.ok_or_else(|| wrong(root, "write a `FeatureVersion` as in `1.0`"))?;
     let head = named(root)?;
     let mut feature = Feature {
         identifier: head.identifier,
@@ -98,7 +98,7 @@ pub fn read(text: &str) -> Result<Feature, Problem> {
             "Metadata" => feature.metadata.push(Metadata { element: element(child)?, errors: errors(child)? }),
             "DefinedExecutionError" => feature.errors.push(named(child)?),
             "DataTypeDefinition" => feature.types.push(element(child)?),
-            other => return Err(wrong(child, format!("a feature has no `{other}`"))),
+            other => return Err(wrong(child, format!("a feature cannot contain `{other}`"))),
         }
     }
     if feature.types.len() > MOST_TYPES {
@@ -146,12 +146,12 @@ fn judge(feature: &Feature, root: Node<'_, '_>) -> Result<(), Problem> {
             }
         }
     }
-    endless(feature).map_or(Ok(()), |name| Err(wrong(at(name), format!("the type `{name}` holds itself"))))
+    endless(feature).map_or(Ok(()), |name| Err(wrong(at(name), format!("the type `{name}` contains itself"))))
 }
 
 fn of_lists(ty: &DataType) -> Result<(), &'static str> {
     match ty {
-        DataType::List(inner) if matches!(inner.plain(), DataType::List(_)) => Err("a list holds no lists"),
+        DataType::List(inner) if matches!(inner.plain(), DataType::List(_)) => Err("a list cannot contain lists"),
         DataType::List(inner) | DataType::Constrained(inner, _) => of_lists(inner),
         DataType::Structure(parts) => parts.iter().try_for_each(|p| of_lists(&p.ty)),
         DataType::Basic(_) | DataType::Identifier(_) => Ok(()),
@@ -201,7 +201,7 @@ fn child<'a, 'd>(node: Node<'a, 'd>, name: &'static str) -> Result<Node<'a, 'd>,
     match (all.next(), all.next()) {
         (Some(only), None) => Ok(only),
         (None, _) => Err(wrong(node, format!("`{}` has no `{name}`", node.tag_name().name()))),
-        (_, Some(second)) => Err(wrong(second, format!("`{}` has two of `{name}`", node.tag_name().name()))),
+        (_, Some(second)) => Err(wrong(second, format!("`{}` has `{name}` twice", node.tag_name().name()))),
     }
 }
 
@@ -217,7 +217,7 @@ fn identifier(node: Node<'_, '_>) -> Result<String, Problem> {
     if good {
         return Ok(word.to_owned());
     }
-    Err(wrong(node, format!("`{word}` is no identifier: a capital letter, then letters and digits")))
+    Err(wrong(node, format!("`{word}` is not an identifier: a capital letter, then letters and digits")))
 }
 
 fn named(node: Node<'_, '_>) -> Result<Named, Problem> {
@@ -238,7 +238,7 @@ fn yes(node: Node<'_, '_>) -> Result<bool, Problem> {
     match text(observable) {
         "Yes" => Ok(true),
         "No" => Ok(false),
-        other => Err(wrong(observable, format!("`Observable` is `Yes` or `No`, not `{other}`"))),
+        other => Err(wrong(observable, format!("`Observable` must be `Yes` or `No`, not `{other}`"))),
     }
 }
 
@@ -253,7 +253,7 @@ fn command(node: Node<'_, '_>) -> Result<Command, Problem> {
     let observable = yes(node)?;
     let intermediate = all("IntermediateResponse")?;
     if !observable && !intermediate.is_empty() {
-        return Err(wrong(node, format!("`{identifier}` is not observable and has an `IntermediateResponse`")));
+        return Err(wrong(node, format!("`{identifier}` is not observable, but has an `IntermediateResponse`")));
     }
     let (parameters, responses) = (all("Parameter")?, all("Response")?);
     Ok(Command {
@@ -275,16 +275,16 @@ fn property(node: Node<'_, '_>) -> Result<Property, Problem> {
 
 fn data_type(node: Node<'_, '_>, depth: usize) -> Result<DataType, Problem> {
     if depth > DEEPEST {
-        return Err(wrong(node, format!("a type has more than {DEEPEST} types in it")));
+        return Err(wrong(node, format!("a type is nested more than {DEEPEST} deep")));
     }
     let mut inside = node.children().filter(Node::is_element);
     let (Some(inner), None) = (inside.next(), inside.next()) else {
-        return Err(wrong(node, "a `DataType` holds one type"));
+        return Err(wrong(node, "a `DataType` must contain one type"));
     };
     Ok(match inner.tag_name().name() {
         "Basic" => {
             let found = Basic::ALL.iter().find(|(name, _)| *name == text(inner));
-            let found = found.ok_or_else(|| wrong(inner, format!("there is no basic type `{}`", text(inner))))?;
+            let found = found.ok_or_else(|| wrong(inner, format!("unknown basic type `{}`", text(inner))))?;
             DataType::Basic(found.1)
         }
         "List" => DataType::List(Box::new(data_type(child(inner, "DataType")?, depth + 1)?)),
@@ -302,19 +302,19 @@ fn data_type(node: Node<'_, '_>, depth: usize) -> Result<DataType, Problem> {
             DataType::Constrained(Box::new(of), Box::new(constraints))
         }
         "DataTypeIdentifier" => DataType::Identifier(identifier(inner)?),
-        other => return Err(wrong(inner, format!("there is no type `{other}`"))),
+        other => return Err(wrong(inner, format!("unknown type `{other}`"))),
     })
 }
 
 fn number(node: Node<'_, '_>) -> Result<f64, Problem> {
     let word = text(node);
     let number = word.parse::<f64>().ok().filter(|n| n.is_finite());
-    number.ok_or_else(|| wrong(node, format!("`{word}` is no number")))
+    number.ok_or_else(|| wrong(node, format!("`{word}` is not a number")))
 }
 
 /// How many characters or elements.
 fn size(node: Node<'_, '_>) -> Result<u64, Problem> {
-    text(node).parse().map_err(|_| wrong(node, format!("`{}` is no count", text(node))))
+    text(node).parse().map_err(|_| wrong(node, format!("`{}` is not a count", text(node))))
 }
 
 fn constraints(node: Node<'_, '_>, of: &DataType) -> Result<Constraints, Problem> {
@@ -342,27 +342,27 @@ fn constraints(node: Node<'_, '_>, of: &DataType) -> Result<Constraints, Problem
             "MinimalElementCount" if has_elements => out.count.0 = Some(size(inner)?),
             "MaximalElementCount" if has_elements => out.count.1 = Some(size(inner)?),
             "Pattern" if has_length => out.pattern = Some(inner.text().unwrap_or_default().to_owned()),
-            "Unit" => return Err(wrong(inner, "only numbers have a `Unit`")),
+            "Unit" => return Err(wrong(inner, "only numbers can have a `Unit`")),
             "Length" | "MinimalLength" | "MaximalLength" | "Pattern" => {
-                return Err(wrong(inner, format!("only texts have a `{name}`")));
+                return Err(wrong(inner, format!("only texts can have a `{name}`")));
             }
             "ElementCount" | "MinimalElementCount" | "MaximalElementCount" => {
-                return Err(wrong(inner, format!("only lists have a `{name}`")));
+                return Err(wrong(inner, format!("only lists can have a `{name}`")));
             }
             known if NOT_LOOKED_AT.contains(&known) => {}
-            other => return Err(wrong(inner, format!("there is no constraint `{other}`"))),
+            other => return Err(wrong(inner, format!("unknown constraint `{other}`"))),
         }
     }
     if let (Some((least, _)), Some((greatest, _))) = (out.least, out.greatest)
         && least > greatest
     {
-        return Err(wrong(node, format!("nothing is from {least} to {greatest}")));
+        return Err(wrong(node, format!("no value is from {least} to {greatest}")));
     }
     for (least, most) in [out.length, out.count] {
         if let (Some(least), Some(most)) = (least, most)
             && least > most
         {
-            return Err(wrong(node, format!("nothing has from {least} to {most} parts")));
+            return Err(wrong(node, format!("no value has from {least} to {most} parts")));
         }
     }
     Ok(out)
@@ -372,15 +372,15 @@ fn unit(node: Node<'_, '_>) -> Result<SiUnit, Problem> {
     let factor_at = child(node, "Factor")?;
     let factor = number(factor_at)?;
     if factor == 0.0 {
-        return Err(wrong(factor_at, "the factor of a unit is not 0"));
+        return Err(wrong(factor_at, "the factor of a unit must not be 0"));
     }
     let mut components = Vec::new();
     for part in children(node, "UnitComponent") {
         let (base, exponent) = (child(part, "SIUnit")?, child(part, "Exponent")?);
         let index = BASES.iter().position(|b| *b == text(base));
-        let index = index.ok_or_else(|| wrong(base, format!("there is no base unit `{}`", text(base))))?;
+        let index = index.ok_or_else(|| wrong(base, format!("unknown base unit `{}`", text(base))))?;
         let power = text(exponent).parse::<i32>().ok().filter(|e| e.abs() <= 20);
-        let power = power.ok_or_else(|| wrong(exponent, "an exponent is a whole number, at most 20"))?;
+        let power = power.ok_or_else(|| wrong(exponent, "an exponent must be a whole number of at most 20"))?;
         if power != 0 && index != 0 {
             components.push((index, power));
         }

@@ -31,14 +31,14 @@ fn what_is_wrong_is_said_with_its_line() {
     let cases = [
         ("<Feature", "<Features", "not `Feature`"),
         ("<Observable>No</Observable>", "<Observable>no</Observable>", "not `no`"),
-        ("<Basic>Boolean</Basic>", "<Basic>Bool</Basic>", "no basic type `Bool`"),
-        ("<SIUnit>Kelvin</SIUnit>", "<SIUnit>Celsius</SIUnit>", "no base unit `Celsius`"),
+        ("<Basic>Boolean</Basic>", "<Basic>Bool</Basic>", "unknown basic type `Bool`"),
+        ("<SIUnit>Kelvin</SIUnit>", "<SIUnit>Celsius</SIUnit>", "unknown base unit `Celsius`"),
         ("<Identifier>Quiet</Identifier>", "<Identifier>Mode</Identifier>", "`Mode` is defined twice"),
-        ("<Identifier>Stop</Identifier>", "<Identifier>stop it</Identifier>", "no identifier"),
+        ("<Identifier>Stop</Identifier>", "<Identifier>stop it</Identifier>", "not an identifier"),
         ("<DataTypeIdentifier>PlateTemperature", "<DataTypeIdentifier>Plate", "`Plate` is not defined"),
         ("<Factor>60</Factor>", "<Factor>0</Factor>", "not 0"),
         ("FeatureVersion=\"1.0\"", "FeatureVersion=\"one\"", "as in `1.0`"),
-        ("<Set>", "<Sets>", "no constraint `Sets`"),
+        ("<Set>", "<Sets>", "unknown constraint `Sets`"),
         ("</Feature>", METADATA, "the error `Unknown` is not defined"),
         ("</Feature>", "", "line"),
     ];
@@ -65,7 +65,7 @@ fn a_type_that_holds_itself_is_refused() {
     let own = "<DataType><Structure><Element><Identifier>A</Identifier><DisplayName/><Description/><DataType>\
                <DataTypeIdentifier>PlateTemperature</DataTypeIdentifier></DataType></Element></Structure></DataType>";
     let problem = read(&format!("{head}{before}{own}</DataTypeDefinition>{after}")).expect_err("endless");
-    assert!(problem.message.contains("holds itself"), "{problem}");
+    assert!(problem.message.contains("contains itself"), "{problem}");
 }
 
 #[test]

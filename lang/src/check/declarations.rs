@@ -98,7 +98,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
                     Diagnostic::error(
                         codes::UNBOUND_EXTERN,
                         name.span,
-                        format!("nothing provides `{}`", name.text),
+                        format!("the compiler has no function `{}`", name.text),
                         "declared `extern`",
                     )
                     .help("only the standard library declares external functions; give it a body with `= ...`"),
@@ -170,8 +170,8 @@ fn material<'a>(lab: &mut Elaborator<'a>, fields: &'a [Field], module: usize) {
         if let Value::Num(n) = &value
             && !lab.graph.constant(n.node).is_some_and(|v| v.is_finite() && v >= 0.0)
         {
-            let headline = "`friction` is a constant that is not negative";
-            lab.report(Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, "cannot be"));
+            let headline = "`friction` must be a constant of 0 or more";
+            lab.report(Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, "not such a number"));
         }
     }
 }

@@ -24,9 +24,9 @@ pub fn beyond(plan: &Plan, within: Span) -> Vec<Diagnostic> {
         if next.file != within.file || next.is_empty() || out.iter().any(|d| d.span() == next) {
             continue;
         }
-        let headline = "what follows a `fail` is never done";
-        let d = Diagnostic::warning(codes::DEAD_BRANCH, next, headline, "never done");
-        out.push(d.because(fails, "always fails here").help("take it out, or say with `if` when it fails"));
+        let headline = "steps after `fail` are never reached";
+        let d = Diagnostic::warning(codes::DEAD_BRANCH, next, headline, "never reached");
+        out.push(d.because(fails, "always fails here").help("remove the steps, or put the `fail` into an `if`"));
     }
     out
 }
@@ -66,9 +66,9 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>, events: &[Event]) -
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
             let before = handlers[..place].iter().find(|(other, _)| matches!(other, Caught::Any) || other == caught);
             if let Some((_, first)) = before.filter(|_| own && !out.iter().any(|d| d.span() == at)) {
-                let headline = "a handler before this one takes the same failures";
-                let d = Diagnostic::warning(codes::DEAD_BRANCH, at, headline, "never done");
-                let d = d.because(plan.get(*first).span, "the first that fits is done");
+                let headline = "an earlier handler takes the same failures";
+                let d = Diagnostic::warning(codes::DEAD_BRANCH, at, headline, "never reached");
+                let d = d.because(plan.get(*first).span, "the first handler that fits runs");
                 out.push(d.help("put the handler for all failures last"));
                 continue;
             }
@@ -78,9 +78,9 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>, events: &[Event]) -
             if known || by_time() || is_declared(plan, *body, lab, name) {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
-                let headline = format!("nothing before it fails with `{name}`");
-                let d = Diagnostic::warning(codes::DEAD_BRANCH, at, headline, "never done");
-                out.push(d.help("take it out, or name the failure that is meant"));
+                let headline = format!("no step before this handler can fail with `{name}`");
+                let d = Diagnostic::warning(codes::DEAD_BRANCH, at, headline, "never reached");
+                out.push(d.help("remove the handler, or name another failure"));
             }
         }
     }
@@ -251,6 +251,6 @@ mod tests {
             })
         };
         assert_eq!(after("wait 1 s; fail broken \"it broke\""), [""; 0]);
-        assert_eq!(after("fail broken \"it broke\"; wait 1 s"), ["dead-branch: what follows a `fail` is never done"]);
+        assert_eq!(after("fail broken \"it broke\"; wait 1 s"), ["dead-branch: steps after `fail` are never reached"]);
     }
 }

@@ -31,8 +31,8 @@ pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     found.extend(given.iter().filter_map(misfit));
     let is_plain = |o: &&NamedExpr| o.name.text == HIDDEN && role != Role::Derived && !is_true(&o.value);
     found.extend(given.iter().filter(is_plain).map(|o| {
-        let headline = format!("`{HIDDEN}` of {what} is `true`, or left out");
-        Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else")
+        let headline = format!("`{HIDDEN}` of {what} must be `true`, or left out");
+        Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "not allowed here")
     }));
     found
 }
@@ -41,17 +41,17 @@ pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
 fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
     let given = std::slice::from_ref(o);
     let headline = match o.name.text.as_str() {
-        GIVEN_BY if word(given, GIVEN_BY) != Some("at") => "`given_by` is `at`: what stands after `holding ... at`",
-        BARS if word(given, BARS).is_none() => "`bars` names the failure of what uses the thing",
-        ONLY_WITH if word(given, ONLY_WITH).is_none() => "`only_with` names a parameter",
-        MATTER if !is_true(&o.value) => "`matter` is `true`, or left out",
-        OUTSIDE if !is_true(&o.value) => "`outside` is `true`, or left out",
-        GIVES_AT if !matches!(&*o.value.kind, ExprKind::Range(..)) => "`gives_at` is a range",
-        GIVES if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`gives` is the name of a species in quotes",
-        INSTEAD if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`instead` is a text",
+        GIVEN_BY if word(given, GIVEN_BY) != Some("at") => "`given_by` must be `at`: the value after `holding ... at`",
+        BARS if word(given, BARS).is_none() => "`bars` must name the failure of a step that uses the thing",
+        ONLY_WITH if word(given, ONLY_WITH).is_none() => "`only_with` must name a parameter",
+        MATTER if !is_true(&o.value) => "`matter` must be `true`, or left out",
+        OUTSIDE if !is_true(&o.value) => "`outside` must be `true`, or left out",
+        GIVES_AT if !matches!(&*o.value.kind, ExprKind::Range(..)) => "`gives_at` must be a range",
+        GIVES if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`gives` must be the name of a species in quotes",
+        INSTEAD if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`instead` must be a text",
         _ => return None,
     };
-    Some(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else"))
+    Some(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "not allowed here"))
 }
 
 /// `matter` or `outside` where there is no amount of each species.
@@ -70,7 +70,7 @@ pub fn matter(
         return None;
     }
     let headline = format!("only an `Amount per Species` can be `{}`", o.name.text);
-    Some(Diagnostic::error(codes::TYPE_MISMATCH, o.name.span, headline, "no amount of each species"))
+    Some(Diagnostic::error(codes::TYPE_MISMATCH, o.name.span, headline, "not an amount of each species"))
 }
 
 /// Options of a function that mean nothing: it may be bounded, and one of two things symmetric.
@@ -83,8 +83,8 @@ pub fn function(parameters: usize, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let wrong =
         truths.filter(|o| !matches!(&*o.value.kind, ExprKind::Name(n) if matches!(n.text.as_str(), "true" | "false")));
     let wrong = wrong.map(|o| {
-        let headline = format!("`{SYMMETRIC}` is `true` or `false`");
-        Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "neither of them")
+        let headline = format!("`{SYMMETRIC}` must be `true` or `false`");
+        Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "neither `true` nor `false`")
     });
     unknown("a function", given, known).into_iter().chain(wrong).collect()
 }
@@ -95,7 +95,7 @@ fn unknown(what: &str, given: &[NamedExpr], known: &[&str]) -> Vec<Diagnostic> {
         given.iter().filter(|o| o.name.text == COUNTS_AS && known.contains(&COUNTS_AS) && count_of(o).is_none());
     let words = words.map(|o| {
         let all: Vec<String> = Count::ALL.iter().map(|(word, _)| format!("`{word}`")).collect();
-        let headline = format!("`{COUNTS_AS}` is one of {}", all.join(", "));
+        let headline = format!("`{COUNTS_AS}` must be one of {}", all.join(", "));
         Diagnostic::about(COUNTS_AS, codes::UNKNOWN_NAME, o.value.span, headline, "not one of them")
     });
     unknown

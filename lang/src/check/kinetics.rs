@@ -69,10 +69,14 @@ fn left_out(
     let (lacks, from) = *sources.first()?;
     let name = |s: SpeciesId| tables.species.get(s).name.as_str();
     let (lacks, from) = (name(lacks), name(from));
-    let headline = format!("`{}` never starts in the model, which gets no `{lacks}` from {from}", reaction.name);
-    let d =
-        Diagnostic::warning(codes::REACTION_NEVER_STARTS, missing[0].1, headline, format!("no `{lacks}` in the model"));
-    Some(d.help(format!("write as a reaction both ways how {from} makes `{lacks}`, `HA <-> H+ + A-`")))
+    let headline = format!("`{}` never starts: the model does not form `{lacks}` from {from}", reaction.name);
+    let d = Diagnostic::warning(
+        codes::REACTION_NEVER_STARTS,
+        missing[0].1,
+        headline,
+        format!("the model contains no `{lacks}`"),
+    );
+    Some(d.help(format!("add a reversible reaction that forms `{lacks}` from {from}, as in `HA <-> H+ + A-`")))
 }
 
 /// The value of an option of a member.
@@ -134,7 +138,7 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
                 && missing.iter().all(|(s, _)| tables.reactions[*first].products.iter().any(|(p, _)| p == s))
         });
         if let Some(cause) = cause {
-            let text = format!("`{}` waits for it and cannot start either", r.name);
+            let text = format!("`{}` depends on it and cannot start either", r.name);
             out[cause].labels.push(matterix_ir::Label { span: r.span, text, primary: false });
             continue;
         }
@@ -151,13 +155,13 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
                     codes::REACTION_NEVER_STARTS,
                     *span,
                     format!("`{}` can never start: there is no `{name}` anywhere in the workflow", r.name),
-                    format!("no vessel holds `{name}`, nothing makes it"),
+                    format!("no vessel holds `{name}`, and no reaction makes it"),
                 );
                 for (s, span) in rest {
                     let other = &tables.species.get(*s).name;
                     d = d.because(*span, format!("`{other}` is missing as well"));
                 }
-                d = d.because(lab_span, "the contents of this lab were looked at");
+                d = d.because(lab_span, "no vessel of this lab holds it");
                 let sources: Vec<String> = tables
                     .species
                     .iter()
@@ -166,7 +170,7 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
                     .take(3)
                     .collect();
                 if sources.is_empty() {
-                    d.help(format!("add `{name}` to a recipe or to what a vessel holds"))
+                    d.help(format!("add `{name}` to a recipe or to the contents of a vessel"))
                 } else {
                     d.help(format!("`{name}` comes from dissolving {}: add one to a recipe", sources.join(", ")))
                 }
@@ -175,10 +179,10 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
                 codes::REACTION_NEVER_STARTS,
                 r.span,
                 format!("`{}` can never start: its reactants never meet in one vessel", r.name),
-                "no vessel gets all of them",
+                "no vessel receives all of them",
             )
-            .because(lab_span, "transfers between the vessels of this lab were looked at")
-            .help("add a transfer that brings them together"),
+            .because(lab_span, "no transfer between the vessels of this lab brings them together")
+            .help("add a transfer that mixes them"),
         };
         out.push(d);
     }
@@ -198,17 +202,18 @@ fn never_warm(tables: &Tables<'_>, index: usize, workflows: &[Starts]) -> Option
         }
         all = Window { reached: false, low: all.low.min(window.low), high: all.high.max(window.high) };
     }
-    let headline = format!("`{}` can never start: its reactants meet, but never where its law holds", r.name);
-    let d = Diagnostic::error(codes::REACTION_NEVER_STARTS, r.span, headline, "never goes on");
+    let headline =
+        format!("`{}` can never start: its reactants meet, but only under conditions outside its law", r.name);
+    let d = Diagnostic::error(codes::REACTION_NEVER_STARTS, r.span, headline, "never proceeds");
     let valid = r.fields.iter().find(|f| f.key.text == "valid");
     let unit = tables.units.dimension("Temperature").and_then(|t| tables.units.preferred_point(&t.dimension));
     Some(match (valid, unit) {
         (Some(field), Some(unit)) if all.low.is_finite() && all.high.is_finite() => {
             let (low, high) = (unit.show(all.low), unit.show(all.high));
-            d.because(field.span, format!("what holds its reactants stays between {low} and {high}"))
-                .help("heat or cool the vessel further, or widen `valid` if the law is known to hold there")
+            d.because(field.span, format!("its reactants are only ever between {low} and {high}"))
+                .help("heat or cool the vessel further, or widen `valid` if the law is known to be valid there")
         }
-        _ => d.help("see what `valid` and `requires` ask for"),
+        _ => d.help("check the conditions `valid` and `requires` of the reaction"),
     })
 }
 

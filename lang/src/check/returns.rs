@@ -19,10 +19,10 @@ pub fn check(verb: &str, name: Span, body: &Block, handlers: &Handlers) -> Vec<D
     let end = block(body, &mut found);
     let end = handled(end, handlers, &mut found);
     if let Some(returns) = end.returns.filter(|_| !end.closed && found.is_empty()) {
-        let headline = format!("`{verb}` does not `return` its result on every way through it");
+        let headline = format!("`{verb}` does not `return` a result on every path");
         let d = Diagnostic::error(codes::MISPLACED, name, headline, "declares a result");
-        let d = d.because(returns, "given on this way");
-        found.push(d.help("end the other ways with `return` too, or with `fail`"));
+        let d = d.because(returns, "returned only on this path");
+        found.push(d.help("end the other paths with `return` or `fail` too"));
     }
     found
 }
@@ -32,11 +32,11 @@ fn block(block: &Block, found: &mut Vec<Diagnostic>) -> End {
     for (i, stmt) in block.stmts.iter().enumerate() {
         let end = statement(stmt, found);
         if let (Some(returns), Some(next)) = (end.returns, block.stmts.get(i + 1)) {
-            let headline = "what follows a `return` is done all the same";
-            let d = Diagnostic::error(codes::MISPLACED, returns, headline, "does not end the skill");
+            let headline = "`return` does not end the skill: the steps after it still run";
+            let d = Diagnostic::error(codes::MISPLACED, returns, headline, "does not end the skill here");
             found.push(
-                d.because(next.span, "done after it")
-                    .help("let `return` stand last on its way: what is done otherwise belongs in `else`"),
+                d.because(next.span, "runs after it")
+                    .help("put `return` last on its path; put the other steps into `else`"),
             );
         }
         out = End { returns: out.returns.or(end.returns), closed: out.closed || end.closed };
@@ -56,7 +56,7 @@ fn handled(body: End, handlers: &Handlers, found: &mut Vec<Diagnostic>) -> End {
     ends.extend(handlers.on.iter().map(|(_, handler)| block(handler, found)));
     if let Some(finally) = &handlers.finally {
         let end = block(finally, found);
-        nowhere(end, "`finally` is done on every way", found);
+        nowhere(end, "`finally` runs on every path", found);
     }
     one_of(ends)
 }
@@ -64,9 +64,9 @@ fn handled(body: End, handlers: &Handlers, found: &mut Vec<Diagnostic>) -> End {
 /// Reports a `return` that gives no result of the skill.
 fn nowhere(end: End, why: &str, found: &mut Vec<Diagnostic>) {
     let Some(returns) = end.returns else { return };
-    let headline = format!("no `return` stands here: {why}");
-    let d = Diagnostic::error(codes::MISPLACED, returns, headline, "does not end the skill");
-    found.push(d.help("let `return` stand at the end of the skill"));
+    let headline = format!("`return` cannot stand here: {why}");
+    let d = Diagnostic::error(codes::MISPLACED, returns, headline, "does not end the skill here");
+    found.push(d.help("put `return` at the end of the skill"));
 }
 
 fn statement(stmt: &Stmt, found: &mut Vec<Diagnostic>) -> End {
@@ -100,7 +100,7 @@ fn statement(stmt: &Stmt, found: &mut Vec<Diagnostic>) -> End {
         }
         StmtKind::Repeat { body, .. } | StmtKind::RepeatWhile { body, .. } | StmtKind::For { body, .. } => {
             let end = block(body, found);
-            nowhere(end, "the loop goes on", found);
+            nowhere(end, "the loop continues", found);
             End::default()
         }
         StmtKind::Start { body, .. } => {

@@ -247,15 +247,15 @@ pub fn things(sources: &Sources, uses: &[Uses]) -> Vec<Diagnostic> {
     let doses = filled.values().any(|(.., used)| *used);
     for (reagent, (span, vessel, _)) in filled.into_iter().filter(|(_, (.., used))| doses && !used) {
         all.remove(span);
-        let headline = format!("`{reagent}` stands ready in `{vessel}`, and no workflow of this file uses it");
-        let d = Diagnostic::warning(codes::UNUSED, *span, headline, "filled, and never touched");
-        out.push(d.help("take it out, or add the step that is missing: is it to be dispensed, poured or drawn?"));
+        let headline = format!("no workflow of this file uses `{reagent}` in `{vessel}`");
+        let d = Diagnostic::warning(codes::UNUSED, *span, headline, "filled, but never used");
+        out.push(d.help("remove it, or add the missing step that dispenses, pours or draws it"));
     }
     let idle = all.into_iter().filter(|(_, used)| !used);
     out.extend(idle.map(|(span, _)| {
-        let headline = format!("`{}` is not used by any workflow of this file", sources.slice(span));
-        Diagnostic::advice(codes::UNUSED, span, headline, "nothing has to do with it")
-            .help("take it out, or use it: was another thing meant in one of the steps?")
+        let headline = format!("no workflow of this file uses `{}`", sources.slice(span));
+        Diagnostic::advice(codes::UNUSED, span, headline, "no step uses it")
+            .help("remove it, or use it: did you mean it in one of the steps?")
     }));
     out
 }
@@ -284,9 +284,9 @@ pub fn reagents(names: &Names<'_>, sources: &Sources, module: usize) -> Vec<Diag
         if named.get(word).is_some_and(|(first, several)| *several || *first != index) {
             continue;
         }
-        let headline = format!("the {what} `{name}` is not used in this file");
-        let d = Diagnostic::warning(codes::UNUSED, span, headline, "nothing contains or names it");
-        out.push(d.help("take it out, or use it: does a vessel hold another one instead?"));
+        let headline = format!("this file never uses the {what} `{name}`");
+        let d = Diagnostic::warning(codes::UNUSED, span, headline, "no vessel or recipe contains it");
+        out.push(d.help("remove it, or use it: should a vessel hold it?"));
     }
     out
 }
@@ -391,7 +391,7 @@ mod tests {
         );
         assert_eq!(
             idle("heat plate to 30 degC; stop heating plate"),
-            ["unused: `other` is not used by any workflow of this file"]
+            ["unused: no workflow of this file uses `other`"]
         );
     }
 }

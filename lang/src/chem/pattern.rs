@@ -14,7 +14,7 @@ impl Pattern {
     /// Reads a SMARTS text; the error is the reader's, in its words.
     pub fn parse(text: &str) -> Result<Pattern, String> {
         if text.is_empty() {
-            return Err("nothing is written".into());
+            return Err("it is empty".into());
         }
         if text.len() > MAX_LENGTH || !text.chars().all(|c| c.is_ascii_graphic()) {
             return Err("too long, or not plain characters without blanks".into());
@@ -22,7 +22,7 @@ impl Pattern {
         match guarded(|| parse_smarts(text)) {
             Some(Ok(query)) if !query.atoms.is_empty() => Ok(Pattern { query }),
             Some(Err(error)) => Err(error.to_string()),
-            _ => Err("not understood".into()),
+            _ => Err("unsupported".into()),
         }
     }
 

@@ -141,7 +141,7 @@ fn unreadable(template: &str, error: &RxnError) -> TemplateError {
         template.match_indices(part).map(|(start, _)| start).find(alone).or_else(|| template.find(part))
     };
     let (detail, offset) = match error {
-        RxnError::MissingArrow => ("a template has the form `reactants>>products`".to_string(), None),
+        RxnError::MissingArrow => ("a template must have the form `reactants>>products`".to_string(), None),
         RxnError::SmilesParse { part, source } | RxnError::SmartsParse { part, source } => {
             let (detail, position) = without_position(source);
             (detail, place(part).map(|start| (start + position).min(template.len())))
@@ -149,7 +149,7 @@ fn unreadable(template: &str, error: &RxnError) -> TemplateError {
         RxnError::UnsupportedReactantTemplate { part, reason } => (reason.to_string(), place(part)),
         RxnError::UnsupportedAtomicNumberPrimitive { primitive }
         | RxnError::UnsupportedProductPrimitive { primitive } => {
-            (format!("`{primitive}` cannot stand here"), place(primitive))
+            (format!("`{primitive}` is not allowed here"), place(primitive))
         }
         RxnError::ResourceLimit { .. } | RxnError::AtomicNumberExpansionLimit { .. } => ("too large".into(), None),
     };

@@ -126,7 +126,7 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
                 codes::MISSING_FIELD,
                 span,
                 format!("`{name}` has no constant"),
-                "where it lies is unknown",
+                "the position of this equilibrium is unknown",
             )
             .help(
                 "add `constant: 1e-14`, `log_constant: -14`, `pka: 4.76`, `ksp: 1.8e-10`, `pksp: 9.75`, `partition: 85` for a second liquid, or `potential: 0.77 V` for a half-cell",
@@ -143,8 +143,8 @@ fn check_constant((name, span): (&str, Span), fields: &[Field], diagnostics: &mu
         ),
         (Some(first), None) if first.key.text != ANALYTIC && field(fields, HEAT).is_some() => {
             let Some(heat) = field(fields, HEAT) else { return };
-            let headline = format!("the heat of `{name}` is its `enthalpy`");
-            let d = Diagnostic::error(codes::UNKNOWN_FIELD, heat.key.span, headline, "stands beside `analytic` alone");
+            let headline = format!("use `enthalpy` for the heat of `{name}`");
+            let d = Diagnostic::error(codes::UNKNOWN_FIELD, heat.key.span, headline, "only allowed with `analytic`");
             diagnostics.push(d.because(first.key.span, "its constant").help("write `enthalpy`"));
         }
         (Some(first), None) if first.key.text == ANALYTIC => {
@@ -175,18 +175,18 @@ fn check_form(
     if let Some(f) = field(fields, "pka") {
         let gives = right.iter().any(|(s, n)| is_proton(s) && *n == 1.0) && dry(left) == 1;
         if !gives {
-            let headline = "a pKa is that of an acid: `HA <-> H+ + A-`";
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "does not give off one H+");
-            let d = d.because(f.key.span, "the pKa stands here");
+            let headline = "`pka` needs the equation of an acid: `HA <-> H+ + A-`";
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "does not release one H+");
+            let d = d.because(f.key.span, "the pKa is here");
             diagnostics.push(d.help("write the equation of the acid, or give `log_constant` for this one"));
         }
     }
     if let Some(f) = field(fields, POTENTIAL) {
         let electrons = |side: &[(SpeciesId, f64)]| side.iter().any(|(s, _)| species.get(*s).is_electron);
         if !electrons(left) || electrons(right) {
-            let headline = "a potential is that of a half-cell which takes up electrons: `Fe3+ + e- <-> Fe2+`";
+            let headline = "`potential` needs a half-cell written as a reduction: `Fe3+ + e- <-> Fe2+`";
             let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "no electrons on its left side");
-            let d = d.because(f.key.span, "the potential stands here");
+            let d = d.because(f.key.span, "the potential is here");
             diagnostics.push(d.help("write it as a reduction, with `e-` on the left"));
         }
     }
@@ -197,19 +197,19 @@ fn check_form(
         };
         if !is_in(left, false) || !is_in(right, true) {
             let headline =
-                "a partition constant is that of one species between water and another liquid: `I2 <-> I2_org`";
-            let label = "not from water to one species that is `dissolved_in` another liquid";
+                "`partition` needs the equation of one species between water and another liquid: `I2 <-> I2_org`";
+            let label = "the right side is not one species `dissolved_in` another liquid";
             let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, label);
-            let d = d.because(f.key.span, "the partition constant stands here");
+            let d = d.because(f.key.span, "the partition constant is here");
             diagnostics.push(d.help("declare the other form, `species I2_org { formula: \"I2\", dissolved_in: CHCl3 }`, or give `log_constant` for another equation"));
         }
     }
     let is_one_solid =
         dry(left) == 1 && left.iter().all(|(s, n)| species.get(*s).is_water || (*n == 1.0 && !species.get(*s).is_gas));
     if let Some(f) = field(fields, "ksp").or_else(|| field(fields, "pksp")).filter(|_| !is_one_solid) {
-        let headline = "a solubility product is that of one solid: `AgCl <-> Ag+ + Cl-`";
+        let headline = "a solubility product needs the equation of one solid: `AgCl <-> Ag+ + Cl-`";
         let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "its left side is not one solid");
-        diagnostics.push(d.because(f.key.span, "the solubility product stands here"));
+        diagnostics.push(d.because(f.key.span, "the solubility product is here"));
     }
 }
 
@@ -231,10 +231,12 @@ fn gas_form(
     let name = &species.get(gas).name;
     let wrong = |headline: String, label: &str| {
         let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, label);
-        Box::new(d.help("write what the gas dissolves as, and what becomes of that by itself: `CO2(g) <-> CO2`"))
+        Box::new(
+            d.help("write the gas and its dissolved form only, and later reactions on their own: `CO2(g) <-> CO2`"),
+        )
     };
     let dry = |side: &'_ [(SpeciesId, f64)]| dry_terms(species, side);
-    let headline = format!("the equilibrium of `{name}` says how much of it dissolves");
+    let headline = format!("the equilibrium of the gas `{name}` must give its solubility");
     let [(dissolved, one)] = dry(right)[..] else {
         return Err(wrong(headline, "its right side is not one dissolved species"));
     };
@@ -242,11 +244,11 @@ fn gas_form(
         return Err(wrong(headline, "its left side is not one gas"));
     }
     if one != 1.0 || dry(left)[0].1 != 1.0 {
-        return Err(wrong(headline, "of the gas and of what it dissolves as there is one each"));
+        return Err(wrong(headline, "both coefficients must be 1"));
     }
     let def = species.get(dissolved);
     if !def.is_aqueous() || def.charge() != 0 {
-        return Err(wrong(headline, &format!("`{}` is not a neutral species that is dissolved", def.name)));
+        return Err(wrong(headline, &format!("`{}` is not a neutral dissolved species", def.name)));
     }
     match before.iter().find(|e| e.gas.is_some_and(|(other, _)| other == gas)) {
         Some(first) => {

@@ -36,7 +36,7 @@ pub fn forms(fields: &[Field], nested: &[&str], texts: &[&str], diagnostics: &mu
             FieldValue::Literal(_) | FieldValue::Species(_) => (false, "one value"),
         };
         if !fits {
-            let headline = format!("`{key}` is {form}");
+            let headline = format!("`{key}` must be {form}");
             diagnostics.push(Diagnostic::error(codes::TYPE_MISMATCH, f.span, headline, "something else"));
         }
     }

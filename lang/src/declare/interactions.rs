@@ -91,12 +91,12 @@ pub fn collect<'a>(
             Diagnostic::error(codes::INTERACTION_FORM, span, headline, label).help(help)
         };
         if let Some((s, _)) = members.iter().find(|(s, n)| *n != 1.0 || !species.get(*s).is_aqueous()) {
-            let headline = format!("`{}` is between what is dissolved", name.text);
-            let label = format!("`{}` stands here as it is not dissolved", species.get(*s).name);
+            let headline = format!("`{}` must be between dissolved species", name.text);
+            let label = format!("`{}` is not dissolved", species.get(*s).name);
             diagnostics.push(refused(
                 headline,
                 &label,
-                "name two or three ions or dissolved molecules, without numbers before them",
+                "name two or three ions or dissolved molecules, without coefficients",
             ));
             continue;
         }
@@ -107,9 +107,9 @@ pub fn collect<'a>(
         let is_self = has_twice && charges.iter().any(|z| *z != 0);
         let Some(kind) = Kind::of(&charges).filter(|_| !is_self && (!has_twice || members.len() == 2)) else {
             let headline =
-                format!("`{}` is between two different species, or three with both signs of charge", name.text);
+                format!("`{}` must be between two different species, or three with both signs of charge", name.text);
             let help = "write `Na+ + Cl-`, `Na+ + K+`, `CO2 + Na+`, `Na+ + K+ + Cl-` or `CO2 + Na+ + Cl-`";
-            diagnostics.push(refused(headline, "not of that form", help));
+            diagnostics.push(refused(headline, "another form", help));
             continue;
         };
         let before = diagnostics.len();
@@ -150,12 +150,12 @@ fn check_numbers(name: &str, kind: Kind, fields: &[Field], span: Span, diagnosti
     let before = diagnostics.len();
     for f in misplaced {
         let headline = format!("species of these charges have no `{}`", f.key.text);
-        let d = Diagnostic::error(codes::INTERACTION_FORM, f.key.span, headline, "of other charges");
+        let d = Diagnostic::error(codes::INTERACTION_FORM, f.key.span, headline, "for other charges");
         diagnostics.push(d.because(span, format!("`{name}` has {}", joined(&wanted, "and"))));
     }
     if diagnostics.len() == before && own.iter().all(|key| field(fields, key).is_none()) {
-        let headline = format!("`{name}` has no number");
-        let d = Diagnostic::error(codes::MISSING_FIELD, span, headline, "how strong it is remains open");
-        diagnostics.push(d.help(format!("it has {}", joined(&wanted, "or"))));
+        let headline = format!("`{name}` has no parameter");
+        let d = Diagnostic::error(codes::MISSING_FIELD, span, headline, "its strength is unknown");
+        diagnostics.push(d.help(format!("give {}", joined(&wanted, "or"))));
     }
 }

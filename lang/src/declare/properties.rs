@@ -23,7 +23,7 @@ pub fn declared<'a>(kinds: &Kinds<'a>, diagnostics: &mut Vec<Diagnostic>) -> Pro
     for m in kinds.values().filter(|k| !k.is_asset && k.name == OF).flat_map(own) {
         let Some(name) = member_name(m.member) else { continue };
         if !matches!(m.member.kind, MemberKind::Value { role: Role::Param, .. }) {
-            let headline = format!("`{}` is no parameter: a property of species is one", name.text);
+            let headline = format!("`{}` must be a `param`: a property of species is a parameter", name.text);
             diagnostics.push(Diagnostic::error(codes::MISPLACED, m.member.span, headline, "not a property"));
             continue;
         }

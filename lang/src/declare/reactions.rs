@@ -34,17 +34,18 @@ pub fn collect<'a>(
         };
         let equation = equation(name, reactants, products);
         if left.iter().chain(&right).any(|(s, _)| species.get(*s).is_electron) {
-            let headline = format!("`{}` names the electron, of which there is never any", name.text);
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "`e-` stands in half-cells");
+            let headline = format!("`{}` contains the electron, but a solution holds no free electrons", name.text);
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "only half-cells have `e-`");
             diagnostics
                 .push(d.help("write the whole reaction, or an equilibrium: `equilibrium iron: Fe3+ + e- <-> Fe2+`"));
             continue;
         }
         if let Some((gas, _)) = left.iter().chain(&right).find(|(s, _)| species.get(*s).is_gas) {
             let gas = &species.get(*gas).name;
-            let headline = format!("`{}` names the gas `{gas}`, of which no mixture holds any", name.text);
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "a gas stands in its equilibrium");
-            diagnostics.push(d.help("write what is dissolved: CO2 for CO2(g)"));
+            let headline = format!("`{}` contains the gas `{gas}`, but a solution holds only dissolved gas", name.text);
+            let d =
+                Diagnostic::error(codes::EQUILIBRIUM_FORM, equation, headline, "a gas belongs in its own equilibrium");
+            diagnostics.push(d.help("write the dissolved species: CO2 for CO2(g)"));
             continue;
         }
         check_balance(species, &left, &right, equation, &name.text, diagnostics);
@@ -94,7 +95,7 @@ pub(super) fn check_balance(
             Diagnostic::error(
                 codes::UNBALANCED,
                 span,
-                format!("`{}` is counted by mass and cannot stand in an equation", species.name),
+                format!("`{}` is declared `by: mass` and cannot be in an equation", species.name),
                 "its atoms are unknown",
             )
             .because(species.span, "declared `by: mass` here"),
@@ -112,7 +113,7 @@ pub(super) fn check_balance(
             diagnostics.push(Diagnostic::error(
                 codes::UNBALANCED,
                 span,
-                format!("the coefficients of `{name}` are not moderate positive numbers"),
+                format!("the coefficients of `{name}` must be positive and of moderate size"),
                 "cannot be balanced",
             ));
             return;
@@ -122,7 +123,7 @@ pub(super) fn check_balance(
         codes::UNBALANCED,
         span,
         format!("`{name}` does not balance: {}", in_words(&found)),
-        "left and right differ",
+        "the sides differ",
     );
     match &found.suggestion {
         Some(coefficients) if coefficients.len() == left.len() + right.len() => {
@@ -210,14 +211,12 @@ fn template_error(error: TemplateError, smirks: &str, span: Span) -> Diagnostic 
         TemplateError::ReactantCount(n) => {
             at("the template does not fit the equation", format!("its left side has {n} molecules"), span)
         }
-        TemplateError::NoMatch => at(
-            "the template matches none of the reactants",
-            "no arrangement of the reactants has this pattern".into(),
-            span,
-        )
-        .help("every molecule left of `>>` must be found in a reactant with a `smiles` structure"),
+        TemplateError::NoMatch => {
+            at("the template matches no reactant", "the reactants do not have this pattern".into(), span)
+                .help("every molecule left of `>>` must be found in a reactant with a `smiles` structure")
+        }
         TemplateError::Impossible => {
-            at("the template gives atoms with too many bonds", "impossible products".into(), span)
+            at("the template would give atoms with too many bonds", "impossible products".into(), span)
                 .help("a mapped atom keeps its charge unless the right side states one: `[O+0:1]`")
         }
         TemplateError::OtherProducts { gives, missing } => {
@@ -238,7 +237,7 @@ fn template_error(error: TemplateError, smirks: &str, span: Span) -> Diagnostic 
                 .help("a mapped atom keeps its charge unless the right side states one: `[O+0:1]`")
         }
         TemplateError::Unsupported => {
-            at("the template cannot be run", "too many ways to match, or a pattern that is not understood".into(), span)
+            at("the template cannot be applied", "too many matches, or an unsupported pattern".into(), span)
         }
     }
 }

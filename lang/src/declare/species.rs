@@ -102,11 +102,11 @@ impl<'a> SpeciesTable<'a> {
                 aliases.push((id, decl.module, other));
                 if let Some(f) = fields.iter().find(|f| f.key.text != "same_as") {
                     let headline = format!(
-                        "`{}` is another name of `{}` and has no `{}` of its own",
+                        "`{}` is another name of `{}` and cannot have its own `{}`",
                         name.text, other.text, f.key.text
                     );
                     let d = Diagnostic::error(codes::MISPLACED, f.span, headline, "has no effect");
-                    diagnostics.push(d.help(format!("give it with `{}`, or leave out `same_as`", other.text)));
+                    diagnostics.push(d.help(format!("give it for `{}`, or remove `same_as`", other.text)));
                 }
                 continue;
             }
@@ -150,7 +150,7 @@ impl<'a> SpeciesTable<'a> {
         let liquid = self.get(found);
         let is_liquid = found.0 as usize != index && field(liquid.fields, DISSOLVED_IN).is_none();
         let wrong = match () {
-            () if liquid.is_water => "what is dissolved in water needs no `dissolved_in`",
+            () if liquid.is_water => "a species in water needs no `dissolved_in`",
             () if !is_liquid || liquid.charge() != 0 || liquid.is_gas => "not a liquid",
             () if def.charge() != 0 || !def.dissolves.is_empty() => "ions stay in water",
             () => return Some(found),
@@ -362,29 +362,29 @@ fn formula_error(kind: &FormulaErrorKind) -> String {
     match kind {
         FormulaErrorKind::Empty => "no atoms".into(),
         FormulaErrorKind::UnknownElement(s) => format!("no element has the symbol `{s}`"),
-        FormulaErrorKind::UnexpectedCharacter(c) => format!("`{c}` has no place here"),
+        FormulaErrorKind::UnexpectedCharacter(c) => format!("`{c}` is not allowed here"),
         FormulaErrorKind::Unclosed(c) => format!("`{c}` is not closed"),
-        FormulaErrorKind::Unopened(c) => format!("`{c}` closes nothing"),
-        FormulaErrorKind::BadCount => "a count is a whole number from 1 to a million".into(),
+        FormulaErrorKind::Unopened(c) => format!("`{c}` has no opening bracket"),
+        FormulaErrorKind::BadCount => "a count must be a whole number from 1 to a million".into(),
         FormulaErrorKind::TooDeep => "too many brackets inside each other".into(),
     }
 }
 
 fn structure_error(kind: &StructureErrorKind) -> String {
     match kind {
-        StructureErrorKind::Empty => "nothing is written".into(),
-        StructureErrorKind::UnexpectedCharacter => "a character that has no place here".into(),
+        StructureErrorKind::Empty => "it is empty".into(),
+        StructureErrorKind::UnexpectedCharacter => "a character that is not allowed here".into(),
         StructureErrorKind::UnexpectedEnd => "it ends inside an atom or branch".into(),
         StructureErrorKind::UnknownElement(s) => format!("no element has the symbol `{s}`"),
-        StructureErrorKind::OpenRing(n) => format!("ring bond {n} is opened and not closed"),
-        StructureErrorKind::ConflictingRing(n) => format!("the two ends of ring bond {n} differ"),
-        StructureErrorKind::Parentheses => "parentheses do not pair".into(),
+        StructureErrorKind::OpenRing(n) => format!("ring bond {n} is not closed"),
+        StructureErrorKind::ConflictingRing(n) => format!("the two ends of ring bond {n} do not match"),
+        StructureErrorKind::Parentheses => "parentheses do not match".into(),
         StructureErrorKind::BracketAtom(a) => format!("the atom `[{a}]` cannot be read"),
         StructureErrorKind::Valence(e) => format!("{e} has too many bonds"),
         StructureErrorKind::NotAromatic => "a lower-case ring that cannot be aromatic".into(),
-        StructureErrorKind::Wildcard => "`*` stands for no element".into(),
+        StructureErrorKind::Wildcard => "`*` is not an element".into(),
         StructureErrorKind::TooLarge => "too long, or nested too deeply".into(),
-        StructureErrorKind::Unsupported => "not understood".into(),
+        StructureErrorKind::Unsupported => "unsupported".into(),
     }
 }
 
@@ -393,8 +393,7 @@ fn unknown_properties(fields: &[Field], known: &[&str], diagnostics: &mut Vec<Di
     let before = diagnostics.len();
     super::fields::unknown_fields(fields, known, "a species", diagnostics);
     for d in diagnostics.iter_mut().skip(before).filter(|d| d.code == codes::UNKNOWN_FIELD) {
-        d.help
-            .push("a property of your own is declared with its type: `capability Species { param NAME: TYPE }`".into());
+        d.help.push("to add your own property, declare its type: `capability Species { param NAME: TYPE }`".into());
     }
 }
 
@@ -415,8 +414,8 @@ fn check_forms(fields: &[Field], diagnostics: &mut Vec<Diagnostic>) {
             _ => continue,
         };
         if !fits {
-            let headline = format!("`{}` is {form}", f.key.text);
-            diagnostics.push(Diagnostic::error(codes::TYPE_MISMATCH, f.span, headline, "something else"));
+            let headline = format!("`{}` must be {form}", f.key.text);
+            diagnostics.push(Diagnostic::error(codes::TYPE_MISMATCH, f.span, headline, "another value"));
         }
     }
 }
@@ -445,7 +444,7 @@ fn check_dissociation(
         diagnostics.push(Diagnostic::error(
             codes::UNBALANCED,
             span,
-            format!("`{}` ({formula}) does not split into these ions", salt.name),
+            format!("`{}` ({formula}) cannot dissociate into these ions", salt.name),
             "atoms or charge differ",
         ));
     }

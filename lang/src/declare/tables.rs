@@ -344,7 +344,7 @@ fn second_matter(kind: &Kind<'_>, first: &MemberRef<'_>, second: &MemberRef<'_>)
     let headline = format!("`{}` has two amounts of matter", kind.name);
     let d = Diagnostic::error(codes::DUPLICATE_NAME, second.member.span, headline, "the second one");
     d.because(first.member.span, "the first one")
-        .help("give what is apart from the rest a part of its own: `part bed: Bed`")
+        .help("put the separate amount into a part of its own: `part bed: Bed`")
 }
 
 /// The option of an extensive quantity per species that says that it is matter.

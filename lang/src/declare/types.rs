@@ -77,10 +77,10 @@ impl Tables<'_> {
                 Diagnostic::error(
                     codes::MISPLACED,
                     condition.span,
-                    "`where` belongs to a parameter of a workflow, skill or command",
-                    "not looked at here",
+                    "`where` is only for parameters of a workflow, skill or command",
+                    "not checked here",
                 )
-                .help("a process has `while`, an event `when`; what an instance may be given is said with `at_least`"),
+                .help("a process takes `while`, an event `when`; limit a value of an instance with `at_least`"),
             );
         }
         self.resolve_parameter_type(ty, module, diagnostics)
@@ -131,7 +131,7 @@ impl Tables<'_> {
 
     fn unknown_type(&self, name: &ast::Name, module: usize) -> Diagnostic {
         let mut d =
-            near::unknown(name, format!("there is no type `{}`", name.text), "not a dimension, capability or asset");
+            near::unknown(name, format!("unknown type `{}`", name.text), "not a dimension, capability or asset");
         let kinds = self.names.visible(module).filter(|(_, id)| self.kinds.contains_key(id)).map(|(n, _)| n);
         let names: Vec<&str> = kinds.chain(self.units.dimension_names()).chain(BUILT_IN.iter().copied()).collect();
         let near = near::nearest(&name.text, names);
@@ -176,8 +176,8 @@ fn enumeration(words: &[ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Type {
 
 /// "not supported yet" at a span.
 pub fn unsupported(span: matterix_ir::Span, what: &str) -> Diagnostic {
-    Diagnostic::error(codes::UNSUPPORTED, span, format!("{what} are not supported yet"), "no meaning yet")
-        .help("this part of the language is read and formatted, but cannot be checked or run in this version")
+    Diagnostic::error(codes::UNSUPPORTED, span, format!("{what} are not supported yet"), "not supported yet")
+        .help("this version can read and format this part of the language, but not check or run it")
 }
 
 /// Words for a message: `a`, `b`, `c`.

@@ -131,8 +131,8 @@ fn declared_twice(what: &str, again: Span, first: Span) -> Diagnostic {
 }
 
 fn unknown_dimension(units: &Units, n: &Name) -> Diagnostic {
-    let headline = format!("there is no dimension `{}`", n.text);
-    let mut d = near::unknown(n, headline, "not declared above");
+    let headline = format!("unknown dimension `{}`", n.text);
+    let mut d = near::unknown(n, headline, "not declared before this");
     d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
     d
 }
@@ -163,8 +163,13 @@ fn dimension(units: &Units, e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Dime
 
 fn malformed(e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Dimension {
     diagnostics.push(
-        Diagnostic::error(codes::SYNTAX, e.span, "a dimension is a product of powers of dimensions", "not a dimension")
-            .help("write, for example, `dimension Speed = Length / Duration`"),
+        Diagnostic::error(
+            codes::SYNTAX,
+            e.span,
+            "a dimension must be a product of powers of dimensions",
+            "not a dimension",
+        )
+        .help("write, for example, `dimension Speed = Length / Duration`"),
     );
     Dimension::any()
 }
@@ -219,8 +224,8 @@ fn unit(units: &mut Units, item: &Item, diagnostics: &mut Vec<Diagnostic>) {
         return;
     }
     if !(factor.is_finite() && factor > 0.0) {
-        let headline = format!("the size of the unit `{}` is not a number above zero", name.text);
-        diagnostics.push(Diagnostic::error(codes::OUT_OF_RANGE, name.span, headline, "measures nothing"));
+        let headline = format!("the size of the unit `{}` must be a number above zero", name.text);
+        diagnostics.push(Diagnostic::error(codes::OUT_OF_RANGE, name.span, headline, "not such a number"));
         return;
     }
     let offset = origin.as_ref().and_then(|e| constant(units, e, diagnostics)).map(|(_, v)| v);
@@ -262,8 +267,13 @@ fn constant(units: &Units, e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Optio
         ExprKind::Error => None,
         _ => {
             diagnostics.push(
-                Diagnostic::error(codes::SYNTAX, e.span, "a unit is defined by a constant quantity", "not a constant")
-                    .help("write, for example, `unit bar: Pressure = 1e5 Pa with prefixes`"),
+                Diagnostic::error(
+                    codes::SYNTAX,
+                    e.span,
+                    "a unit must be defined by a constant quantity",
+                    "not a constant",
+                )
+                .help("write, for example, `unit bar: Pressure = 1e5 Pa with prefixes`"),
             );
             None
         }
@@ -277,7 +287,7 @@ pub fn unit_error(unit: &UnitText, error: UnitError) -> Diagnostic {
             let mut d = Diagnostic::error(
                 codes::UNKNOWN_UNIT,
                 unit.span,
-                format!("there is no unit `{name}`"),
+                format!("unknown unit `{name}`"),
                 "not a declared unit",
             );
             d.help.extend(near::question(&near));
@@ -286,7 +296,7 @@ pub fn unit_error(unit: &UnitText, error: UnitError) -> Diagnostic {
                 d = d.guess(format!("replace with `{mended}`"), unit.span, mended);
             }
             if name == "%" {
-                d.help = vec!["say of what: `%w/w` (by mass) or `%v/v` (by volume)".into()];
+                d.help = vec!["write `%w/w` (by mass) or `%v/v` (by volume)".into()];
                 d.fixes.clear();
             }
             d
@@ -309,6 +319,6 @@ pub fn unit_error(unit: &UnitText, error: UnitError) -> Diagnostic {
             format!("`{}` is not a unit", unit.text),
             "cannot be read as a product of units",
         )
-        .help("a unit is one word without blanks: `kg/(mol*s)`, `W/(m^2*K)`, `1/s`"),
+        .help("write a unit as one word without blanks: `kg/(mol*s)`, `W/(m^2*K)`, `1/s`"),
     }
 }

@@ -62,7 +62,10 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(
                 codes::TYPE_MISMATCH,
                 e.span,
-                format!("`{field}` names a link: `{field}: \"{}\"`", robot.links.last().map_or("tool0", |l| &l.name)),
+                format!(
+                    "`{field}` must name a link: `{field}: \"{}\"`",
+                    robot.links.last().map_or("tool0", |l| &l.name)
+                ),
                 "not a text",
             ));
             return None;
@@ -100,16 +103,16 @@ impl<'a> Elaborator<'a> {
                 Some(_) => Diagnostic::error(
                     codes::OUT_OF_RANGE,
                     span,
-                    format!("`{}` cannot stand at {position} {unit}", joint.name),
-                    format!("it moves in {range}"),
+                    format!("joint `{}` cannot be at {position} {unit}", joint.name),
+                    format!("its limits are {range}"),
                 ),
                 None => Diagnostic::error(
                     codes::MISSING_FIELD,
                     span,
-                    format!("`home` is missing: `{}` cannot stand at 0 {unit}", joint.name),
-                    format!("it moves in {range}"),
+                    format!("`home` is missing: joint `{}` cannot be at 0 {unit}", joint.name),
+                    format!("its limits are {range}"),
                 )
-                .help("give the positions of all joints that move, in the order of the file: `home: (0, -45) deg`"),
+                .help("give the positions of all moving joints, in the order of the file: `home: (0, -45) deg`"),
             });
             return None;
         }
@@ -129,8 +132,8 @@ impl<'a> Elaborator<'a> {
                 Diagnostic::error(
                     codes::WRONG_ARGUMENTS,
                     e.span,
-                    format!("`home` gives {} positions for {} joints that move", items.len(), moving.len()),
-                    "not one for each",
+                    format!("`home` gives {} positions for {} moving joints", items.len(), moving.len()),
+                    "the numbers differ",
                 )
                 .help(format!("in this order: {}", names.join(", "))),
             );

@@ -62,7 +62,7 @@ impl<'a> Elaborator<'a> {
                     self.report(Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         quantity.span,
-                        "a vessel cannot hold less than nothing",
+                        "a vessel cannot hold a negative amount",
                         "negative",
                     ));
                     return;
@@ -94,10 +94,10 @@ impl<'a> Elaborator<'a> {
                 Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     e.span,
-                    "say of what: `10 g of water`",
-                    "not an amount of something",
+                    "write the substance too: `10 g of water`",
+                    "not an amount of a substance",
                 )
-                .help("contents are a sum of quantities with `of`: `10 g of water + 12 mmol of EtOH`"),
+                .help("write contents as a sum of quantities with `of`: `10 g of water + 12 mmol of EtOH`"),
             ),
         }
     }
@@ -128,7 +128,7 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::CONCENTRATION_KIND,
                         span,
-                        format!("`{}` is counted by mass and has no amount of substance", name.text),
+                        format!("`{}` is declared `by: mass` and has no amount of substance", name.text),
                         "cannot be given in mol",
                     )
                     .help("give a mass: `1 g of ...`"),
@@ -143,7 +143,7 @@ impl<'a> Elaborator<'a> {
         let mut d = Diagnostic::error(
             codes::UNIT_MISMATCH,
             span,
-            format!("contents are given as {wanted}, found {found}"),
+            format!("contents need {wanted}, found {found}"),
             format!("this is {found}"),
         );
         if solution && n.dimension == amount {

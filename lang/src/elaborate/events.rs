@@ -134,9 +134,9 @@ impl<'a> Elaborator<'a> {
             noting.insert(0, set(again, is_pending));
             let once = self.graph.add(Op::State(again));
             let once = self.graph.unary(UnaryOp::Not, once);
-            let text = format!("{name} is set off once at a time");
+            let text = format!("{name} must happen before it is triggered again");
             let help =
-                "it was set off again before it happened: make its condition true less often, or its delay shorter";
+                "it was triggered again before it happened: make its condition true less often, or its delay shorter";
             out.limits.push(limit(owner, (once, span), (PENDING, text, help)));
         }
         if self.graph.constant(time).is_none() {
@@ -146,7 +146,7 @@ impl<'a> Elaborator<'a> {
             noting.push(set(early, below));
             let was_below = self.graph.add(Op::State(early));
             let fits = self.graph.unary(UnaryOp::Not, was_below);
-            let text = format!("the delay of {name} is at least 0 s");
+            let text = format!("the delay of {name} must be at least 0 s");
             let help = "an event cannot happen before its condition is true";
             out.limits.push(limit(owner, (fits, delay.time.span), ("out_of_range", text, help)));
         }

@@ -330,7 +330,7 @@ impl<'a> Elaborator<'a> {
                 Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     at.span,
-                    "a transfer is named by its share and two parameters",
+                    "write a transfer as its share and two parameters",
                     "not a transfer between two parameters",
                 )
                 .help("write `move(share, from: a, to: b)`"),
@@ -362,8 +362,8 @@ impl<'a> Elaborator<'a> {
         }
         let known = names.visible(module).filter(|(_, id)| is_hazard(&names.decl(*id).item.kind)).map(|(n, _)| n);
         let near = near::nearest(&name.text, known);
-        let headline = format!("there is no hazard or caution `{}`", name.text);
-        let d = near::unknown(name, headline, "nothing to allow");
+        let headline = format!("unknown hazard or caution `{}`", name.text);
+        let d = near::unknown(name, headline, "cannot be allowed");
         self.report(near::proposed(d, &near, name.span));
     }
 }

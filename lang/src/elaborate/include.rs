@@ -119,9 +119,14 @@ impl<'a> Elaborator<'a> {
                         continue;
                     };
                     if self.included.len() >= MOST_LABS || building.open.len() >= DEEPEST {
-                        let headline = format!("at most {MOST_LABS} labs can be included, {DEEPEST} deep");
+                        let headline = format!("a lab may include at most {MOST_LABS} labs, nested {DEEPEST} deep");
                         let span = self.lab_name;
-                        self.report(Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "this lab holds too many"));
+                        self.report(Diagnostic::error(
+                            codes::OUT_OF_RANGE,
+                            span,
+                            headline,
+                            "this lab includes too many",
+                        ));
                         continue;
                     }
                     let full = format!("{within}{}", name.text);
@@ -179,7 +184,7 @@ impl<'a> Elaborator<'a> {
         for o in opening.given {
             if !params.iter().any(|p| p.name.text == o.name.text) {
                 let near = near::nearest(&o.name.text, params.iter().map(|p| &p.name.text));
-                let headline = format!("this lab has no parameter `{}`", o.name.text);
+                let headline = format!("the included lab has no parameter `{}`", o.name.text);
                 let mut d = Diagnostic::error(codes::UNKNOWN_PARAMETER, o.name.span, headline, "not a parameter");
                 d.help.extend(near::question(&near));
                 self.report(d);
@@ -235,10 +240,10 @@ impl<'a> Elaborator<'a> {
         };
         let (a, b) = (show(self, first, a), show(self, second, b));
         let headline = format!("`{}` is {a} in one included lab and {b} in another", name.text);
-        let d = Diagnostic::error(codes::AMBIGUOUS_NAME, name.span, headline, "which one?");
+        let d = Diagnostic::error(codes::AMBIGUOUS_NAME, name.span, headline, "which value?");
         let lab = self.lab_name;
         let d = d.because(lab, "both labs are included here");
-        self.report(d.help(format!("decide it in the lab that includes them: `{}: ...`", name.text)));
+        self.report(d.help(format!("set it in the lab that includes them: `{}: ...`", name.text)));
     }
 
     /// Moves what an included lab holds to where the lab stands: all that stands on nothing in it.

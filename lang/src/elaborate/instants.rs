@@ -47,7 +47,7 @@ impl<'a> Lines<'a> for Instant<'_> {
                 Diagnostic::error(
                     codes::INVALID_LAW,
                     law.span,
-                    "an event is an instant: it assigns, it does not flow",
+                    "an event is instantaneous: it assigns a value and has no rate",
                     "not an assignment",
                 )
                 .help("write `x = x + ...`"),

@@ -36,14 +36,14 @@ impl<'a> Elaborator<'a> {
         let setting = self.instances[id.0 as usize].setting("mounted")?;
         let FieldValue::Expr(e) = setting.value() else { return None };
         let ExprKind::Text(text) = &*e.kind else {
-            let headline = "`mounted` names a frame of what it is a part of: `mounted: \"left\"`";
+            let headline = "`mounted` must name a frame of the parent: `mounted: \"left\"`";
             self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "not a text"));
             return None;
         };
         let found = frames.iter().find(|f| f.name == *text).cloned();
         if found.is_none() {
             let close = nearest(text, frames.iter().map(|f| f.name.as_str()));
-            let headline = format!("what it is a part of has no frame `{text}`");
+            let headline = format!("the parent of `{}` has no frame `{text}`", self.instances[id.0 as usize].name);
             let d = Diagnostic::about(text, codes::UNKNOWN_NAME, e.span, headline, "no such frame");
             self.report(match question(&close) {
                 Some(asked) => d.help(asked),
@@ -112,7 +112,7 @@ impl<'a> Elaborator<'a> {
     fn no_joint(&mut self, name: &Name, robot: &Robot) {
         let close = nearest(&name.text, robot.joints.iter().map(|j| j.name.as_str()));
         let headline = format!("no joint `{}`", name.text);
-        let d = unknown(name, headline, "not a joint that stands before it");
+        let d = unknown(name, headline, "no earlier joint has this name");
         self.report(match question(&close) {
             Some(asked) => d.help(asked),
             None => d,
@@ -135,8 +135,8 @@ impl<'a> Elaborator<'a> {
         match <[f64; 3]>::try_from(axis) {
             Ok(axis) if length > 0.0 => Some(axis.map(|v| v / length)),
             _ => {
-                let headline = "an axis is three numbers, not all of them 0";
-                self.report(Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, "points nowhere"));
+                let headline = "an axis needs three numbers, not all of them 0";
+                self.report(Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, "has no direction"));
                 None
             }
         }

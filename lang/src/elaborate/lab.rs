@@ -107,7 +107,7 @@ impl<'a> Elaborator<'a> {
                 codes::WRONG_KIND,
                 literal.ty.span,
                 format!("`{}` is a capability, not a thing", self.tables.kind_name(kind)),
-                "a lab holds assets",
+                "a lab contains assets",
             );
             d.help.extend(near::question(&fits));
             self.report(d);
@@ -157,7 +157,7 @@ impl<'a> Elaborator<'a> {
                 (_, Value::Instance(_)) => self.report(Diagnostic::error(
                     codes::CIRCULAR,
                     operand.span,
-                    "a thing cannot stand on itself",
+                    "a thing cannot be placed on itself",
                     "this is the same instance",
                 )),
                 (_, other) => {
@@ -185,10 +185,10 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         span,
-                        format!("`{name}` ({kind}) has no places to fill one by one"),
-                        "not a place of it",
+                        format!("`{name}` ({kind}) has no separate places to fill"),
+                        "it has no such place",
                     )
-                    .help("write what it holds without braces: `holding 10 g of water`"),
+                    .help("write its contents without braces: `holding 10 g of water`"),
                 );
                 return;
             };
@@ -216,12 +216,12 @@ impl<'a> Elaborator<'a> {
                 codes::TYPE_MISMATCH,
                 e.span,
                 format!("`{name}` ({kind}) cannot hold anything"),
-                "has no contents",
+                "it has no contents",
             )
             .because(declared, "declared here");
             let first = self.grid_of(&Value::Instance(id)).and_then(|(id, grid)| self.first_place(id, grid));
             if let Some((place, _)) = first {
-                d = d.help(format!("say which place holds it: `holding {{ {place}: ... }}`"));
+                d = d.help(format!("name the place: `holding {{ {place}: ... }}`"));
             }
             self.report(d);
             return;
@@ -266,7 +266,7 @@ impl<'a> Elaborator<'a> {
             });
             let Some(id) = known.filter(|_| of_things) else {
                 let mut d = self.tables.names.unknown(module, &f.key, "pair parameter", is_pair);
-                d.help.push("pair parameters are functions of two bodies, such as `conductance`, and relations without a definition".into());
+                d.help.push("pair parameters are functions of two bodies, such as `conductance`, or relations without a definition".into());
                 self.report(d);
                 continue;
             };
@@ -317,11 +317,12 @@ impl<'a> Elaborator<'a> {
             return Some((b, a));
         }
         let shown = |id: InstanceId| format!("`{}` ({})", self.instances[id.0 as usize].name, self.kind_names(id));
-        let headline = format!("`{}` is not for {} and {}", name.text, shown(a), shown(b));
+        let headline = format!("`{}` does not apply to {} and {}", name.text, shown(a), shown(b));
         let wanted: Vec<String> = types.iter().map(|ty| self.tables.type_name(ty)).collect();
         let said = format!("it takes {} and {}", wanted[0], wanted[1]);
         self.report(
-            Diagnostic::error(codes::TYPE_MISMATCH, name.span, headline, said).because(at, "these two do not fit"),
+            Diagnostic::error(codes::TYPE_MISMATCH, name.span, headline, said)
+                .because(at, "these two have other types"),
         );
         None
     }

@@ -66,7 +66,7 @@ impl<'a> Elaborator<'a> {
         let v = self.expr(value, &mut Scope::module(decl.module));
         let Value::Num(said) = v else { return };
         let Some(actual) = self.concentration_of(&composition, s, &said.dimension) else {
-            let headline = format!("a label cannot be {}", self.describe(&said));
+            let headline = format!("a label must be a concentration, not {}", self.describe(&said));
             let place = "not a concentration of the recipe";
             let d = Diagnostic::error(codes::CONCENTRATION_KIND, value.span, headline, place);
             self.report(d.help("label it in mol/kg, mol/L, mol/kg_solvent, g/L or %w/w"));
@@ -85,8 +85,8 @@ impl<'a> Elaborator<'a> {
         let strengths = Strengths { stated, actual };
         let Some(severity) = strengths.severity(allowed) else { return };
         let (how, shown, of) = (strengths.show(), unit.show(actual), &species.text);
-        let headline = format!("the label of `{}` is {how}: its recipe gives {shown} of {of}", name.text);
-        let d = Diagnostic::error(codes::LABEL_MISMATCH, value.span, headline, "does not agree with the recipe");
+        let headline = format!("the label of `{}` is {how}: by its recipe it contains {shown} of {of}", name.text);
+        let d = Diagnostic::error(codes::LABEL_MISMATCH, value.span, headline, "contradicts the recipe");
         let mut d = Diagnostic { severity, ..d };
         if let Some(at) = self.recipe_line(decl.module, &decl.item.kind, s) {
             d = d.because(at, format!("{of} comes from here"));
@@ -129,14 +129,14 @@ impl<'a> Elaborator<'a> {
     ) -> Diagnostic {
         let Labelled { species, value, .. } = label;
         let ion = &species.text;
-        let headline = format!("the label of `{name}` is of `{ion}`, of which its recipe holds none");
+        let headline = format!("the label of `{name}` gives `{ion}`, but the recipe contains none");
         let d = Diagnostic::error(codes::LABEL_MISMATCH, species.span, headline, "in no line of the recipe");
         let gives = |p: &SpeciesId| self.tables.species.get(*p).dissolves.iter().any(|(ion, _)| *ion == s);
         let Some(salt) = parts.iter().map(|p| p.0).find(gives) else {
             return d.help(format!("label a species of the recipe, or add `{ion}` to it"));
         };
         let salt_name = self.tables.species.get(salt).name.clone();
-        let d = d.help(format!("`{salt_name}` gives `{ion}` in water, of which the recipe has none"));
+        let d = d.help(format!("`{salt_name}` gives `{ion}` only in water, and the recipe contains no water"));
         let Some(strength) = self.concentration_of(parts, salt, kind) else { return d };
         let mended = format!("{} of {salt_name}", rounded(strength, unit));
         d.guess("label the salt", value.span.to(species.span), mended)

@@ -303,7 +303,7 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::INVALID_LAW,
                         span,
-                        "a process changes flows and derivatives only",
+                        "a process can change only flows and derivatives",
                         "not a flow",
                     )
                     .help("write `x' += rate` for a state; only an event assigns `x = value`"),
@@ -312,8 +312,13 @@ impl<'a> Elaborator<'a> {
             };
             if op == AssignOp::Set {
                 self.report(
-                    Diagnostic::error(codes::INVALID_LAW, span, "a flow is a sum of contributions", "assigned here")
-                        .help("use `+=` or `-=`, so that other processes can contribute too"),
+                    Diagnostic::error(
+                        codes::INVALID_LAW,
+                        span,
+                        "a flow is a sum of contributions: it cannot be assigned",
+                        "assigned here",
+                    )
+                    .help("use `+=` or `-=`, so that other processes can contribute"),
                 );
                 return;
             }
@@ -407,7 +412,7 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let (from, to) = (self.spoken_name(from), self.spoken_name(to));
-        let headline = format!("`{member}` goes with what `{from}` holds, and `{to}` has no place for it");
+        let headline = format!("`{to}` has no `{member}`: the `{member}` of the contents of `{from}` would be lost");
         let d = Diagnostic::warning(codes::BALANCE_BREACH, at, headline, "would be lost");
         self.report(d.help(format!("give `{to}` contents that have `{member}` as well")));
     }
@@ -424,7 +429,7 @@ impl<'a> Elaborator<'a> {
                         codes::WRONG_ARGUMENTS,
                         call.span,
                         "`rinse` needs one thing",
-                        "rinse what?",
+                        "which thing?",
                     )
                     .help("write `rinse(thing)`"),
                 );
@@ -520,7 +525,7 @@ impl<'a> Elaborator<'a> {
                 codes::WRONG_ARGUMENTS,
                 at,
                 "`soil` needs a thing and `from` another",
-                "soil what?",
+                "which things?",
             )
             .help("write `soil(thing, from: other)`"),
         );
@@ -552,7 +557,7 @@ impl<'a> Elaborator<'a> {
                 Diagnostic::error(
                     codes::INVALID_LAW,
                     callee.span,
-                    "only `move(...)` may stand here by itself",
+                    "only `move(...)` may be a line of its own here",
                     "has no effect",
                 )
                 .help("write `move(quantity, from: a, to: b)`"),
@@ -611,7 +616,7 @@ impl<'a> Elaborator<'a> {
         self.report(Diagnostic::error(
             codes::UNIT_MISMATCH,
             at,
-            format!("contents are moved by mass, volume or fraction, not by {found}"),
+            format!("give the moved contents as mass, volume or fraction, not as {found}"),
             format!("this is {found}"),
         ));
         None
@@ -625,7 +630,7 @@ impl<'a> Elaborator<'a> {
                 codes::TYPE_MISMATCH,
                 span,
                 format!("`{name}` has no contents"),
-                "nothing to move",
+                "it is not a vessel",
             ));
         }
         mixture
@@ -669,7 +674,7 @@ impl<'a> Elaborator<'a> {
             if !self.prototype && !self.writes(target, new, scope) {
                 self.report(
                     Diagnostic::error(codes::INVALID_LAW, target.span, "only a state can be assigned", "not a state")
-                        .help("parameters are fixed, derived quantities follow from states"),
+                        .help("parameters are fixed, and derived quantities follow from states"),
                 );
             }
             return None;
@@ -750,7 +755,7 @@ impl<'a> Elaborator<'a> {
                         codes::FLOW_UNBALANCED,
                         p.name.span,
                         format!(
-                            "`{}` does not conserve `{flow}`: what one body loses the other does not gain",
+                            "`{}` does not conserve `{flow}`: one body does not gain the amount that the other loses",
                             p.name.text
                         ),
                         "the two contributions do not cancel",

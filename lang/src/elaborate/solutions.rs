@@ -98,7 +98,7 @@ impl<'a> Elaborator<'a> {
         let mut lines: Vec<Line<'a>> = Vec::new();
         for field in fields {
             let FieldValue::Expr(e) = &field.value else {
-                let headline = format!("how much of `{}` is a quantity", field.key.text);
+                let headline = format!("the amount of `{}` must be a quantity", field.key.text);
                 self.report(Diagnostic::error(codes::TYPE_MISMATCH, field.span, headline, "not a quantity"));
                 good = false;
                 continue;
@@ -111,7 +111,7 @@ impl<'a> Elaborator<'a> {
         let mut rests = lines.iter().filter(|l| matches!(l.share, Share::Rest));
         if let (Some(first), Some(again)) = (rests.next(), rests.next()) {
             let (first, again) = (first.span, again.span);
-            let place = "only one line can be the rest";
+            let place = "only one line can be `rest`";
             let d = Diagnostic::error(codes::INVALID_RECIPE, again, "`rest` is given twice", place);
             self.report(d.because(first, "first given here"));
             good = false;
@@ -185,17 +185,15 @@ impl<'a> Elaborator<'a> {
         let total: f64 = lines.iter().map(|l| self.mass_of(&l.share)).sum();
         let problem = match (rest, total > 0.0) {
             (_, true) if some || per_volume.is_some() => {
-                Some("a recipe is given either in amounts or in fractions and concentrations, not both")
+                Some("give a recipe either in amounts or in fractions and concentrations, not both")
             }
-            (Some(_), true) => Some("`rest` completes a recipe of fractions or concentrations, not of amounts"),
+            (Some(_), true) => Some("`rest` is for a recipe of fractions or concentrations, not of amounts"),
             (None, false) if per_volume.is_some() => {
-                Some("a recipe of concentrations needs a `rest`: what fills it up to the mark")
+                Some("a recipe of concentrations needs a `rest`: the solvent that fills it up to the mark")
             }
-            (Some(_), false) if shares >= 1.0 => {
-                Some("nothing is left for `rest`: the fractions already make up the whole")
-            }
+            (Some(_), false) if shares >= 1.0 => Some("no room for `rest`: the fractions already add up to the whole"),
             (None, false) if some && (shares - 1.0).abs() > 1e-6 => {
-                Some("the fractions do not add up to the whole; complete them with `rest`")
+                Some("the fractions do not add up to 1; complete them with `rest`")
             }
             (_, false) if !some && per_volume.is_none() => Some("the recipe is empty"),
             _ => None,
@@ -258,9 +256,9 @@ impl<'a> Elaborator<'a> {
             return Some((whole, left));
         }
         let litres = matterix_ir::quantity::show_number((1e4 * (volume + shared * whole.max(0.0))).round() / 1e4);
-        let headline = "nothing is left for `rest`: the other parts already fill the volume";
+        let headline = "no room for `rest`: the other components already fill the volume";
         let d = Diagnostic::error(codes::INVALID_RECIPE, at, headline, "this recipe");
-        self.report(d.help(format!("of each litre of solution they take up {litres} L; take less of them")));
+        self.report(d.help(format!("they take up {litres} L of each litre of solution; use less of them")));
         None
     }
 
@@ -317,8 +315,8 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(
                 codes::INVALID_RECIPE,
                 span,
-                "a recipe needs constant quantities that are not negative",
-                "not one",
+                "a recipe needs constant quantities of 0 or more",
+                "not such a quantity",
             ));
         }
         v

@@ -57,8 +57,7 @@ impl<'a> Elaborator<'a> {
             }),
             Value::Error => None,
             Value::Concentration(..) => {
-                let help = "say which with a unit, in brackets: `(... as mol/L)`, `(... as mol/kg)`, \
-                            `(... as mol/kg_solvent)`, `(... as %w/w)`; without brackets `as` applies to the whole expression";
+                let help = "choose one by its unit, in brackets: `(... as mol/L)`, `(... as mol/kg)`, `(... as mol/kg_solvent)`, `(... as %w/w)`; without brackets `as` applies to the whole expression";
                 self.without_kind(span, help);
                 None
             }
@@ -71,11 +70,11 @@ impl<'a> Elaborator<'a> {
 
     /// `v[S]` used before a unit says which concentration is meant.
     pub fn kindless(&mut self, span: Span) {
-        self.without_kind(span, "say which with a unit: `as mol/L`, `as mol/kg`, `as mol/kg_solvent`, `as %w/w`");
+        self.without_kind(span, "choose one by its unit: `as mol/L`, `as mol/kg`, `as mol/kg_solvent`, `as %w/w`");
     }
 
     fn without_kind(&mut self, span: Span, help: &str) {
-        let headline = "this concentration has no kind yet";
+        let headline = "the kind of this concentration is open";
         let d = Diagnostic::error(codes::CONCENTRATION_KIND, span, headline, "per mass, per volume or per solvent?");
         self.report(d.help(help));
     }
@@ -87,7 +86,7 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::TEMPERATURE_POINT,
                         span,
-                        "a point on a scale cannot be multiplied or divided",
+                        "a temperature on a scale cannot be multiplied or divided",
                         "a temperature, not a difference",
                     )
                     .help("use `kelvin(...)` for the absolute value, or subtract another temperature first"),
@@ -117,7 +116,7 @@ impl<'a> Elaborator<'a> {
                         codes::TEMPERATURE_POINT,
                         span,
                         "two temperatures cannot be added",
-                        "both sides are points on a scale",
+                        "both are temperatures on a scale",
                     )
                     .because(at_b, "a difference is written in `K`")
                     .help("add a difference: `80 degC + 20 K`"),
@@ -130,7 +129,7 @@ impl<'a> Elaborator<'a> {
                         codes::TEMPERATURE_POINT,
                         span,
                         "a temperature cannot be subtracted from a difference",
-                        "the right side is a point on a scale",
+                        "the right side is a temperature on a scale",
                     )
                     .help("a difference is written in `K`"),
                 );
@@ -184,8 +183,13 @@ impl<'a> Elaborator<'a> {
         if base.point || power.point {
             let span = if base.point { a.span } else { b.span };
             self.report(
-                Diagnostic::error(codes::TEMPERATURE_POINT, span, "a point on a scale has no powers", "a temperature")
-                    .help("use `kelvin(...)` for the absolute value"),
+                Diagnostic::error(
+                    codes::TEMPERATURE_POINT,
+                    span,
+                    "a temperature on a scale has no powers",
+                    "a temperature",
+                )
+                .help("use `kelvin(...)` for the absolute value"),
             );
             return Value::Error;
         }
@@ -194,7 +198,7 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(
                 codes::UNIT_MISMATCH,
                 b.span,
-                "an exponent is a plain number",
+                "an exponent must be a plain number",
                 format!("this is {found}"),
             ));
             return Value::Error;

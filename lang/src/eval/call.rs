@@ -141,9 +141,9 @@ impl<'a> Elaborator<'a> {
                     codes::CIRCULAR,
                     at,
                     format!("`{name}` calls itself"),
-                    "leads back to the same function",
+                    "this calls the same function again",
                 )
-                .help("functions are written out when compiling, so recursion has no end"),
+                .help("the compiler writes functions out, so recursion would never end"),
             );
             return Value::Error;
         }
@@ -264,7 +264,7 @@ impl<'a> Elaborator<'a> {
                     at,
                     match &arg.name {
                         Some(n) => format!("`{callee}` has no parameter `{}`", n.text),
-                        None => format!("`{callee}` takes {} arguments, {} are given", params.len(), args.len()),
+                        None => format!("`{callee}` takes {} arguments, but {} are given", params.len(), args.len()),
                     },
                     "not a parameter",
                 );
@@ -307,7 +307,7 @@ impl<'a> Elaborator<'a> {
                             codes::WRONG_ARGUMENTS,
                             span,
                             format!("`{callee}` needs `{}`", param.name.text),
-                            "not given",
+                            "missing",
                         ));
                         good = false;
                         Value::Error

@@ -160,7 +160,7 @@ impl Elaborator<'_> {
                 codes::TEMPERATURE_POINT,
                 span,
                 format!("`{what}` expects a difference, found a temperature"),
-                "this is a point on a scale",
+                "this is a temperature on a scale",
             );
             d = d.help("a difference of temperatures is written in `K`");
             self.report(d);
@@ -192,14 +192,14 @@ impl Elaborator<'_> {
             codes::TYPE_MISMATCH,
             span,
             format!("`{what}` expects {wanted}, but `{name}` is {kind}"),
-            format!("`{name}` is no {}", self.tables.kind_name(missing)),
+            format!("`{name}` is not a {}", self.tables.kind_name(missing)),
         )
         .because(declared, format!("`{name}` is declared here"));
         let places = self.grid_of(&Value::Instance(id)).and_then(|(id, grid)| self.first_place(id, grid));
         if let Some((place, child)) = places
             && kinds.iter().all(|k| self.instance_is(child, *k))
         {
-            d = d.help(format!("say which of its places: `{name}[{place}]`"));
+            d = d.help(format!("name one of its places: `{name}[{place}]`"));
         } else if !fitting.is_empty() {
             d.help.extend(near::question(&fitting));
         }

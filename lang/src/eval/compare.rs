@@ -254,9 +254,9 @@ impl<'a> Elaborator<'a> {
         if let (Some(x), Some(y)) = (self.graph.constant(a.node), self.graph.constant(b.node))
             && x > y
         {
-            let headline = "the range is empty: its lower end is above its upper end";
-            let d = Diagnostic::error(codes::EMPTY_RANGE, at_low.to(at_high), headline, "nothing lies in it");
-            self.report(d.help("the lower end comes first"));
+            let headline = "this range is empty: its lower end is above its upper end";
+            let d = Diagnostic::error(codes::EMPTY_RANGE, at_low.to(at_high), headline, "no value is in it");
+            self.report(d.help("write the lower end first"));
             return Value::Error;
         }
         Value::Range(Box::new(a), Box::new(b))

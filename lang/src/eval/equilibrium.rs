@@ -463,12 +463,12 @@ impl<'a> Elaborator<'a> {
         let mut logarithms = [water, liquid].into_iter().map(|s| {
             let name = self.tables.species.get(s).name.clone();
             let Some(density) = self.number_of(s, "density") else {
-                let headline = format!("the density of `{name}` is not known");
+                let headline = format!("the density of `{name}` is unknown");
                 let d = Diagnostic::error(
                     codes::MISSING_FIELD,
                     at,
                     headline,
-                    "a partition constant compares concentrations",
+                    "a partition constant is a ratio of concentrations",
                 );
                 self.report(d.help("give the density of the liquid, or the ratio of molalities as `constant`"));
                 return None;
@@ -487,8 +487,8 @@ impl<'a> Elaborator<'a> {
             return None;
         };
         if numbers.is_empty() || numbers.len() > Layout::TERMS {
-            let headline = format!("`analytic` has 1 to {} numbers, not {}", Layout::TERMS, numbers.len());
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, given.span, headline, "of log10 K");
+            let headline = format!("`analytic` takes 1 to {} numbers, not {}", Layout::TERMS, numbers.len());
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, given.span, headline, "coefficients of log10 K");
             self.report(d.help("log10 K = A1 + A2 T + A3 / T + A4 log10 T + A5 / T^2 + A6 T^2, with T in K"));
             return None;
         }
@@ -575,9 +575,9 @@ impl<'a> Elaborator<'a> {
         }
         let span =
             CONSTANTS.iter().find_map(|key| expr_of(fields, key)).map_or(self.tables.equilibria[e].span, |e| e.span);
-        let headline = "the constant of an equilibrium is above 0";
-        let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "not a constant");
-        self.report(d.help("a reaction that goes to its end has a large constant: `constant: 1e20`"));
+        let headline = "the constant of an equilibrium must be above 0";
+        let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "not above 0");
+        self.report(d.help("for a complete reaction give a large constant: `constant: 1e20`"));
     }
 
     /// An equilibrium that follows from those before it must agree with them: each circle of constants closes.
@@ -593,8 +593,8 @@ impl<'a> Elaborator<'a> {
                 if why.0.contains(&format!("`{}`", def.name)) {
                     let headline = format!("this equilibrium cannot be solved: {why}");
                     let d =
-                        Diagnostic::error(codes::EQUILIBRIUM_FORM, def.equation, headline, "needs something dissolved");
-                    self.report(d.help("an equilibrium relates what is dissolved in water, or a solid and its ions"));
+                        Diagnostic::error(codes::EQUILIBRIUM_FORM, def.equation, headline, "needs dissolved species");
+                    self.report(d.help("an equilibrium relates species dissolved in water, or a solid and its ions"));
                 }
             }
         }
@@ -672,9 +672,9 @@ impl<'a> Elaborator<'a> {
         let Some(circle) = system.circles().iter().find(is_of_it) else { return };
         let part = all.iter().zip(&circle.factors).filter(|(_, f)| f.abs() > NO_PART);
         let names: Vec<String> = part.map(|(e, _)| format!("`{}`", self.tables.equilibria[*e].name)).collect();
-        let headline = format!("`{}` is at equilibrium at every moment, by {}", def.name, joined(&names, "and"));
-        let d = Diagnostic::error(codes::REACTION_AT_EQUILIBRIUM, def.span, headline, "would never come to rest");
-        self.report(d.help("leave the reaction out, or the equilibria if it is the slow step that you want to follow"));
+        let headline = format!("`{}` is always at equilibrium because of {}", def.name, joined(&names, "and"));
+        let d = Diagnostic::error(codes::REACTION_AT_EQUILIBRIUM, def.span, headline, "its rate would have no effect");
+        self.report(d.help("remove the reaction, or the equilibria if you want to follow its rate"));
     }
 
     /// Whether a circle closes; told where the last of its equilibria stands, or at a place that is given.
@@ -692,8 +692,8 @@ impl<'a> Elaborator<'a> {
         let [off, off_where_warm] = sums.map(|sum| (sum / LN_10).abs());
         let label = match (off <= CLOSED, off_where_warm <= CLOSED) {
             (true, true) => return,
-            (false, _) => format!("follows from the others, but for {off:.2} in log10 K"),
-            _ => format!("follows from the others at 25 degC, but at 60 degC only for {off_where_warm:.2} in log10 K"),
+            (false, _) => format!("differs by {off:.2} in log10 K from the value that the others imply"),
+            _ => format!("agrees with the others at 25 degC, but differs by {off_where_warm:.2} in log10 K at 60 degC"),
         };
         let names: Vec<String> = part.iter().map(|(e, _)| format!("`{}`", self.tables.equilibria[*e].name)).collect();
         let Some((last, _)) = part.last() else { return };
@@ -708,10 +708,10 @@ impl<'a> Elaborator<'a> {
         let theirs = part.iter().map(|(e, _)| *e).find(|e| self.is_of_library(*e));
         let help = match theirs.filter(|_| part.iter().any(|(e, _)| !self.is_of_library(*e))) {
             Some(e) => format!(
-                "leave out one of them: it follows from the rest; yours takes the place of the library's if you call it `{}`",
+                "remove one of them, as it follows from the rest; to replace the library's, call yours `{}`",
                 self.tables.equilibria[e].name
             ),
-            None => "leave out one of them: it follows from the rest".to_owned(),
+            None => "remove one of them, as it follows from the rest".to_owned(),
         };
         self.report(d.help(help));
     }

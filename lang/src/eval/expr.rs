@@ -179,7 +179,7 @@ impl<'a> Elaborator<'a> {
             codes::TEMPERATURE_POINT,
             span,
             "this temperature is below absolute zero",
-            "there is none so low",
+            "impossible temperature",
         ));
         Value::Error
     }
@@ -308,7 +308,7 @@ impl<'a> Elaborator<'a> {
                     codes::WRONG_KIND,
                     n.span,
                     format!("`{}` is not a value", n.text),
-                    "cannot stand in an expression",
+                    "not allowed in an expression",
                 ));
                 Value::Error
             }
@@ -370,9 +370,9 @@ impl<'a> Elaborator<'a> {
         }
         let is_unit = self.tables.units.find(&n.text).is_some();
         let near = if is_unit { Vec::new() } else { near::nearest(&n.text, candidates) };
-        let mut d = near::unknown(n, format!("there is no `{}` here", n.text), "not declared");
+        let mut d = near::unknown(n, format!("unknown name `{}`", n.text), "not declared");
         if is_unit {
-            d = d.help(format!("`{}` is a unit: a unit is one word without blanks, such as `W/K`", n.text));
+            d = d.help(format!("`{}` is a unit: write a unit as one word without blanks, such as `W/K`", n.text));
         }
         if let Some(import) = names.import_of(scope.module, &n.text, is_value).filter(|_| !is_unit) {
             self.report(import.offered(d));
@@ -380,11 +380,11 @@ impl<'a> Elaborator<'a> {
         }
         d = match self.elsewhere(n, scope) {
             Some((lab, span)) if scope.lab => d
-                .because(span, format!("declared in the lab `{lab}`"))
+                .because(span, format!("it is declared in the lab `{lab}`"))
                 .help(format!("this is another lab than `{lab}`")),
             Some((lab, span)) => d
-                .because(span, format!("declared in the lab `{lab}`"))
-                .help("only workflows and tests see a lab: make it a parameter, and give it in the call"),
+                .because(span, format!("it is declared in the lab `{lab}`"))
+                .help("only workflows and tests see a lab: make it a parameter, and pass it in the call"),
             None => near::proposed(d, &near, n.span),
         };
         self.report(d);
@@ -497,10 +497,12 @@ impl<'a> Elaborator<'a> {
     fn of(&mut self, inner: &'a Expr, substance: &'a Name, at: Span, scope: &mut Scope) -> Value {
         let value = self.expr(inner, scope);
         if self.substance(substance, scope.module).is_some() && !self.looked_into.contains(&at) {
-            let headline = format!("nothing looks whether this is `{}`", substance.text);
+            let headline =
+                format!("this `of {}` has no effect: no source is given to check it against", substance.text);
             self.report(
-                Diagnostic::warning(codes::MISPLACED, at, headline, "no source is named with it")
-                    .help("`of` is looked at in a call with `from` and a vessel: `transfer 50 uL of dye from a to b`"),
+                Diagnostic::warning(codes::MISPLACED, at, headline, "no source vessel").help(
+                    "`of` is checked only in a call with `from` and a vessel: `transfer 50 uL of dye from a to b`",
+                ),
             );
         }
         value
@@ -549,7 +551,7 @@ impl<'a> Elaborator<'a> {
         let Some(items) = items else { return Value::Error };
         if !FOLDS.contains(&fold.text.as_str()) {
             let known: Vec<String> = FOLDS.iter().map(|f| format!("`{f}`")).collect();
-            let d = near::unknown(fold, format!("there is no fold `{}`", fold.text), "not a fold");
+            let d = near::unknown(fold, format!("unknown function over a set: `{}`", fold.text), "not such a function");
             self.report(d.help(format!("use {}", known.join(", "))));
             return Value::Error;
         }
@@ -656,10 +658,10 @@ impl<'a> Elaborator<'a> {
             other => {
                 let help = match other {
                     Value::Range(..) => hints::OF_RANGE,
-                    _ => "use a list `[a, b]`, a capability, or a set such as `m.species`",
+                    _ => "write a list `[a, b]`, a capability, or a set such as `plate.columns` or `m.species`",
                 };
-                let headline = format!("{} is not a finite set", other.what());
-                let place = "cannot be gone through one by one";
+                let headline = format!("cannot loop over {}", other.what());
+                let place = "not a list or a finite set";
                 self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, place).help(help));
                 None
             }

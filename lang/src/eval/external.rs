@@ -210,8 +210,13 @@ impl Elaborator<'_> {
         let Some((_, bound)) = TABLE.iter().find(|(n, _)| *n == name) else {
             let declared = params.first().copied().unwrap_or(at);
             self.report(
-                Diagnostic::error(codes::UNBOUND_EXTERN, at, format!("nothing provides `{name}`"), "called here")
-                    .because(declared, "declared `extern` here"),
+                Diagnostic::error(
+                    codes::UNBOUND_EXTERN,
+                    at,
+                    format!("the compiler has no function `{name}`"),
+                    "called here",
+                )
+                .because(declared, "declared `extern` here"),
             );
             return Value::Error;
         };
@@ -433,10 +438,10 @@ impl Elaborator<'_> {
         }
         let at = self.calls.first().copied().unwrap_or(at);
         let name = self.tables.species.get(s).name.clone();
-        let headline = format!("no equilibrium of the file has `{name}` as a gas");
-        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, at, headline, "asked for here");
+        let headline = format!("no equilibrium of this file contains `{name}` as a gas");
+        let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, at, headline, "used here");
         self.report(
-            d.help("write how much of it dissolves: `equilibrium dissolves: CO2(g) <-> CO2 { log_constant: -1.47 }`, or `use std::gases`"),
+            d.help("declare its solubility: `equilibrium dissolves: CO2(g) <-> CO2 { log_constant: -1.47 }`, or `use std::gases`"),
         );
         Value::Error
     }
@@ -463,7 +468,7 @@ impl Elaborator<'_> {
                     self.report(Diagnostic::error(
                         codes::UNIT_MISMATCH,
                         at,
-                        format!("both choices must be alike: {x} and {y}"),
+                        format!("both choices must have the same dimension, not {x} and {y}"),
                         "different dimensions",
                     ));
                     return Value::Error;

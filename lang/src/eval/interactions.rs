@@ -116,8 +116,8 @@ impl<'a> Elaborator<'a> {
             return None;
         };
         if numbers.is_empty() || numbers.len() > Layout::TERMS {
-            let headline = format!("a number has 1 to {} terms, not {}", Layout::TERMS, numbers.len());
-            let d = Diagnostic::error(codes::INTERACTION_FORM, given.span, headline, "of one number");
+            let headline = format!("this parameter takes 1 to {} terms, not {}", Layout::TERMS, numbers.len());
+            let d = Diagnostic::error(codes::INTERACTION_FORM, given.span, headline, "terms of one parameter");
             self.report(d.help(
                 "a0 + a1 (1/T - 1/T0) + a2 ln(T/T0) + a3 (T - T0) + a4 (T^2 - T0^2) + a5 (1/T^2 - 1/T0^2), in K, with T0 = 298.15",
             ));
@@ -155,8 +155,8 @@ impl<'a> Elaborator<'a> {
                 node.and_then(|node| self.glance(node)).is_some_and(|v| v.is_finite() && v > 0.0)
             });
             if numbers.len() != 2 || !above {
-                let headline = "`reach` has two numbers above 0";
-                let d = Diagnostic::error(codes::INTERACTION_FORM, given.span, headline, "not so");
+                let headline = "`reach` needs two numbers above 0";
+                let d = Diagnostic::error(codes::INTERACTION_FORM, given.span, headline, "not such numbers");
                 self.report(d.help("`reach: [2, 12]` for the numbers `b1` and `b2`"));
             }
         }

@@ -70,8 +70,8 @@ impl Elaborator<'_> {
                 self.report(Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     at,
-                    "the size of a group is a whole number from 1 that is known before the run",
-                    "not one",
+                    "the size of a group must be a whole number from 1, known before the run",
+                    "not such a number",
                 ));
                 Value::Error
             }

@@ -19,9 +19,14 @@ impl Elaborator<'_> {
     pub(super) fn measures(&mut self, id: InstanceId, what: &str, at: Span) -> Value {
         if !MEASURES.contains(&what) {
             let known: Vec<String> = MEASURES.iter().map(|m| format!("`{m}`")).collect();
-            let d =
-                Diagnostic::about(what, codes::UNKNOWN_NAME, at, format!("there is no measure `{what}`"), "not one");
-            self.report(d.help(format!("one of {}", known.join(", "))));
+            let d = Diagnostic::about(
+                what,
+                codes::UNKNOWN_NAME,
+                at,
+                format!("unknown measure `{what}`"),
+                "no such measure",
+            );
+            self.report(d.help(format!("use one of {}", known.join(", "))));
             return Value::Error;
         }
         let dimension = self.tables.units.named(if what == "tilt" { "Angle" } else { "Length" });

@@ -80,8 +80,8 @@ impl<'a> Elaborator<'a> {
         if let Some(value) = end {
             return value.clone();
         }
-        let headline = format!("an empty list has no `{}`", name.text);
-        self.report(Diagnostic::error(codes::EMPTY_RANGE, name.span, headline, "there is nothing in it"));
+        let headline = format!("the list is empty: it has no `{}`", name.text);
+        self.report(Diagnostic::error(codes::EMPTY_RANGE, name.span, headline, "empty list"));
         Value::Error
     }
 
@@ -260,9 +260,9 @@ impl<'a> Elaborator<'a> {
                         codes::AMBIGUOUS_NAME,
                         name.span,
                         format!("`{inst}` has several members `{}`", name.text),
-                        "which one?",
+                        "ambiguous",
                     )
-                    .help(format!("say which: {}", owners.join(" or "))),
+                    .help(format!("write {}", owners.join(" or "))),
                 );
                 Value::Error
             }
@@ -293,7 +293,7 @@ impl<'a> Elaborator<'a> {
                 codes::CIRCULAR,
                 name.span,
                 format!("`{}` depends on itself", name.text),
-                "leads back to its own value",
+                "its value would depend on itself",
             ));
             return Value::Error;
         }
@@ -435,7 +435,7 @@ impl<'a> Elaborator<'a> {
                     format!("`{name}` cannot be {}", unit.show(given)),
                     format!("must be {} {}", bound.words(), unit.show(limit)),
                 )
-                .because(o.value.span, "its limit stands here"),
+                .because(o.value.span, "its limit is here"),
             );
         }
     }
@@ -449,7 +449,7 @@ impl<'a> Elaborator<'a> {
                 codes::MISSING_FIELD,
                 span,
                 format!("`{inst_name}` needs `{name}`: {expected}"),
-                "not given, and there is no default",
+                "not given, and it has no default",
             )
             .because(m.member.span, format!("`{}` declares it here", self.tables.kind_name(m.owner)))
             .help(format!("give it in the braces: `{{ {name}: ... }}`")),
@@ -578,8 +578,8 @@ impl<'a> Elaborator<'a> {
                     self.report(Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         word.span,
-                        format!("`{name}` holds nothing that could be asked for `{}`", word.text),
-                        "no contents",
+                        format!("`{name}` has no contents with `{}`", word.text),
+                        "it has no contents",
                     ));
                     return Value::Error;
                 };
@@ -609,8 +609,8 @@ impl<'a> Elaborator<'a> {
                 self.report(Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     word.span,
-                    format!("{} has no `[ ]`", other.what()),
-                    "cannot be asked for parts",
+                    format!("`[ ]` does not apply to {}", other.what()),
+                    "it has no parts",
                 ));
                 Value::Error
             }
@@ -666,7 +666,7 @@ impl<'a> Elaborator<'a> {
                     codes::TYPE_MISMATCH,
                     span,
                     format!("the list has {} elements", items.len()),
-                    "not the number of one of them (the first is 0)",
+                    "out of range (the first is 0)",
                 ));
                 Value::Error
             }
@@ -721,8 +721,8 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::CONCENTRATION_KIND,
                         span,
-                        format!("`{name}` is counted by mass and has no amount of substance"),
-                        "cannot be asked for in mol",
+                        format!("`{name}` is declared `by: mass` and has no amount of substance"),
+                        "it has no amount in mol",
                     )
                     .because(declared, "declared `by: mass` here")
                     .help("use a mass fraction (`as %w/w`) or a mass concentration (`as g/L`)"),
@@ -750,7 +750,7 @@ impl<'a> Elaborator<'a> {
                 codes::CONCENTRATION_KIND,
                 span,
                 format!("a concentration cannot be compared with {found}"),
-                format!("asked for as {found}"),
+                format!("used as {found}"),
             )
             .help(format!("kinds of concentration: {}", kinds.join(", "))),
         );
@@ -868,7 +868,7 @@ impl<'a> Elaborator<'a> {
             Diagnostic::error(
                 codes::MISSING_PROPERTY,
                 span,
-                format!("`{species}` has no {wanted}, which is needed here"),
+                format!("`{species}` has no {wanted}, but a law needs it"),
                 format!("{wanted} is missing"),
             )
             .because(name.span, "needed by this law")

@@ -67,7 +67,7 @@ impl<'a> Elaborator<'a> {
                 let mut d = Diagnostic::error(
                     codes::UNKNOWN_MEMBER,
                     name.span,
-                    format!("a reaction has no `{}`", name.text),
+                    format!("a reaction has no member `{}`", name.text),
                     "not a member",
                 );
                 d.help.extend(crate::near::question(&near));
@@ -156,9 +156,9 @@ impl<'a> Elaborator<'a> {
         if def.reactants.iter().chain(&def.products).any(|(s, _)| *s == species) {
             return Ok(species);
         }
-        let headline = format!("`{}` is not in the equation of `{}`", line.key.text, def.name);
+        let headline = format!("the equation of `{}` does not contain `{}`", def.name, line.key.text);
         let d = Diagnostic::error(codes::UNKNOWN_FIELD, line.key.span, headline, "not one of its species");
-        Err(Box::new(d.help("a catalyst stands on both sides: `A + C -> B + C`")))
+        Err(Box::new(d.help("write a catalyst on both sides: `A + C -> B + C`")))
     }
 
     /// Whether the order of each species is known; where one is not, nor is the unit of the rate constant.
@@ -227,7 +227,7 @@ impl<'a> Elaborator<'a> {
                     codes::MISSING_FIELD,
                     span,
                     format!("`{name}` has no `{key}`"),
-                    "its speed is unknown",
+                    "its rate is unknown",
                 )
                 .help(format!("add `{key}: 0.6 L/(mol*s)` or `{key}: arrhenius(A: ..., Ea: ...)`")),
             );
@@ -299,7 +299,7 @@ impl<'a> Elaborator<'a> {
             let span = self.tables.reactions[r.0 as usize].span;
             self.report(
                 Diagnostic::error(codes::MISSING_FIELD, span, format!("`{name}` has no `{order_key}`"), "its rate law is incomplete")
-                    .help(format!("say on what the rate depends: `{order_key}: {{ A: 1, B: 1 }}`; orders are measured, not read from the equation")),
+                    .help(format!("give the orders: `{order_key}: {{ A: 1, B: 1 }}`; orders are measured and do not follow from the equation")),
             );
             return;
         }
@@ -319,7 +319,7 @@ impl<'a> Elaborator<'a> {
         if self.glance(k.node).is_some_and(|v| v < 0.0) {
             self.report(
                 Diagnostic::error(codes::RATE_UNIT, e.span, "a rate constant cannot be negative", "negative")
-                    .help("write the reaction the other way round, or with `<->` and `reverse`"),
+                    .help("write the reaction in the opposite direction, or with `<->` and `reverse`"),
             );
             return;
         }

@@ -24,7 +24,7 @@ impl Elaborator<'_> {
                 if !a.dimension.agrees(&b.dimension) || a.point != b.point {
                     let (one, other) = (self.describe(a), self.describe(b));
                     let headline =
-                        format!("the points of a table are alike, and like what is read off: {one} and {other}");
+                        format!("all points of a table need the dimensions of the value looked up: {one} and {other}");
                     self.report(Diagnostic::error(codes::UNIT_MISMATCH, at, headline, "different dimensions"));
                     return Value::Error;
                 }
@@ -33,11 +33,11 @@ impl Elaborator<'_> {
                 if self.prototype { self.known(px.node).or(Some(table.len() as f64)) } else { self.known(px.node) };
             match known.filter(|v| table.last().is_none_or(|(before, _)| before < v)) {
                 Some(place) => table.push((place, py.node)),
-                None => return self.not_a_table("where the points of a table are is fixed, and ascends", at),
+                None => return self.not_a_table("the x values of a table must be constants in ascending order", at),
             }
         }
         let (Some(y), [(low, _), .., (high, _)]) = (first, table.as_slice()) else {
-            return self.not_a_table("a table has at least two points", at);
+            return self.not_a_table("a table needs at least two points", at);
         };
         let inside = is_between(&mut self.graph, x.node, (*low, *high));
         let line = lines(&mut self.graph, x.node, &table);
@@ -48,7 +48,7 @@ impl Elaborator<'_> {
     }
 
     fn not_a_table(&mut self, headline: &str, at: Span) -> Value {
-        let d = Diagnostic::error(codes::WRONG_ARGUMENTS, at, headline, "cannot be read off");
+        let d = Diagnostic::error(codes::WRONG_ARGUMENTS, at, headline, "not such a table");
         self.report(d.help("write `interpolate(x, [(0 degC, 1.79), (20 degC, 1.00), (40 degC, 0.65)])`"));
         Value::Error
     }

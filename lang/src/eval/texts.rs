@@ -43,9 +43,10 @@ impl<'a> Elaborator<'a> {
             match part {
                 ast::TextPart::Plain(text) => parts.push(TextPart::Plain(text.clone())),
                 ast::TextPart::Value { form: Some(form), .. } => {
-                    let headline = "a text for people shows digits after the point and nothing else";
-                    let d = Diagnostic::error(codes::SYNTAX, form.span, headline, "of a line to a device");
-                    self.report(d.help("as in `{t as degC :.1}`"));
+                    let headline =
+                        "this format is only for messages to devices; a text takes only digits after the point";
+                    let d = Diagnostic::error(codes::SYNTAX, form.span, headline, "a format for devices");
+                    self.report(d.help("write it as in `{t as degC :.1}`"));
                     good = false;
                 }
                 ast::TextPart::Value { value, digits, .. } => {

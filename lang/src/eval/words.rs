@@ -42,7 +42,7 @@ impl<'a> Elaborator<'a> {
         }
         let near = near::nearest(&n.text, words.iter());
         let headline = format!("`{}` is not one of {}", n.text, list(words));
-        let mut d = near::unknown(n, headline, "no such word");
+        let mut d = near::unknown(n, headline, "unknown word");
         d = near::proposed(d, &near, n.span);
         self.report(d);
         Value::Error
@@ -136,15 +136,15 @@ impl<'a> Elaborator<'a> {
         let d = if knowing.is_empty() {
             let near = near::nearest(&word.text, members.iter().flat_map(|(_, words)| words));
             let best = near.first()?.clone();
-            let headline = format!("`{name}` is never `{}`", word.text);
-            let d = Diagnostic::about(&name, codes::UNKNOWN_NAME, word.span, headline, "no state of it");
+            let headline = format!("`{name}` has no state `{}`", word.text);
+            let d = Diagnostic::about(&name, codes::UNKNOWN_NAME, word.span, headline, "unknown state");
             let d = d.guess(format!("replace with `{best}`"), word.span, best);
             Diagnostic { help: near::question(&near).into_iter().collect(), ..d }
         } else {
             let which: Vec<String> = knowing.iter().map(|m| format!("`{name}.{} is {}`", m.text, word.text)).collect();
             let headline = format!("several states of `{name}` may be `{}`", word.text);
-            let d = Diagnostic::error(codes::AMBIGUOUS_NAME, word.span, headline, "which one?");
-            d.help(format!("say which: {}", which.join(" or ")))
+            let d = Diagnostic::error(codes::AMBIGUOUS_NAME, word.span, headline, "ambiguous");
+            d.help(format!("write {}", which.join(" or ")))
         };
         self.report(d);
         Some(Value::Error)

@@ -77,9 +77,8 @@ impl<'a> Planner<'a, '_> {
         let d = match unknown {
             Some(at) => {
                 let thing = self.text(at);
-                let headline = format!("`{verb}` has to know before the run which thing `{thing}` is");
-                Diagnostic::error(codes::UNSUPPORTED, at, headline, "known only when running")
-                    .help("name the thing itself")
+                let headline = format!("`{thing}` is chosen during the run, but `{verb}` needs a fixed thing");
+                Diagnostic::error(codes::UNSUPPORTED, at, headline, "not known before the run").help("name it directly")
             }
             None => {
                 let headline = format!("`{verb}` does not work with these arguments: {}", first.headline);
@@ -260,7 +259,7 @@ impl<'a> Planner<'a, '_> {
         let words: Vec<String> = missing.iter().map(|label| format!("`{label}`")).collect();
         let at = Span { end: object.span.start, ..object.span };
         let headline = format!("{} is missing before `{value}`", words.join(" or "));
-        let d = Diagnostic::about(&first, codes::WRONG_ARGUMENTS, object.span, headline, "what is this to be?");
+        let d = Diagnostic::about(&first, codes::WRONG_ARGUMENTS, object.span, headline, "which argument is this?");
         self.lab.report(d.guess(format!("add `{first}`"), at, format!("{first} ")));
         true
     }
@@ -341,8 +340,8 @@ impl<'a> Planner<'a, '_> {
             _ => false,
         };
         let Some(import) = names.import_of(module, &text, fits) else { return false };
-        let headline = format!("another `{text}` is meant, which is not imported");
-        let place = format!("`{}` does not fit this", self.form(sig));
+        let headline = format!("this call needs another `{text}`, which is not imported");
+        let place = format!("`{}` does not fit here", self.form(sig));
         self.lab.report(import.offered(Diagnostic::about(&text, codes::UNKNOWN_VERB, span, headline, place)));
         true
     }
@@ -394,7 +393,7 @@ impl<'a> Planner<'a, '_> {
                 Diagnostic::error(
                     codes::WRONG_DEVICE,
                     call.span,
-                    format!("`{name}` ({kind}) cannot `{text}`: it is no {capability}"),
+                    format!("`{name}` ({kind}) cannot `{text}`: it is not a {capability}"),
                     format!("needs a {capability}"),
                 )
                 .because(span, format!("`{name}` is declared here"))
@@ -402,7 +401,7 @@ impl<'a> Planner<'a, '_> {
             None => Diagnostic::error(
                 codes::WRONG_DEVICE,
                 call.span,
-                format!("`{text}` needs a device that is a {capability}"),
+                format!("`{text}` needs a device of the kind {capability}"),
                 "which device?",
             ),
         };
@@ -466,7 +465,7 @@ impl<'a> Planner<'a, '_> {
                     &what,
                     codes::WRONG_ARGUMENTS,
                     span,
-                    format!("`{what}` takes nothing after it"),
+                    format!("`{what}` takes no arguments"),
                     "not expected",
                 ));
                 good = false;
@@ -782,10 +781,10 @@ impl<'a> Planner<'a, '_> {
                 Diagnostic::error(
                     codes::CIRCULAR,
                     at,
-                    format!("`{verb}` calls itself"),
-                    "leads back to the same skill",
+                    format!("the skill `{verb}` calls itself"),
+                    "this calls the same skill again",
                 )
-                .help("use `repeat` to do something again"),
+                .help("use `repeat` to repeat steps"),
             );
             return None;
         }
@@ -899,8 +898,8 @@ impl<'a> Planner<'a, '_> {
             self.lab.report(Diagnostic::error(
                 codes::MISPLACED,
                 sig.span,
-                format!("`{verb}` declares a result but does not `return` one"),
-                "gives nothing",
+                format!("the skill `{verb}` declares a result but does not `return` one"),
+                "returns no result",
             ));
         }
         Some((id, value))

@@ -69,13 +69,13 @@ impl<'a> Planner<'a, '_> {
         let places: Vec<String> =
             places.iter().take(PLACES_SHOWN).map(|m| format!("`{}`", self.lab.spoken_name(*m))).collect();
         let help = match places.as_slice() {
-            [] => format!("the lab provides no `{}`: say what is taken, or leave it out", name.text),
-            some => format!("the lab provides `{}` in {}", name.text, some.join(", ")),
+            [] => format!("the lab has no `{}`: name the right substance, or remove `of`", name.text),
+            some => format!("the lab has `{}` in {}", name.text, some.join(", ")),
         };
         // What it holds instead, where it was filled before the run.
         let instead = sources.first().and_then(|m| Some((m, self.lab.instances[m.0 as usize].origin.clone()?)));
         let help = match instead {
-            Some((m, origin)) => format!("{help}; `{}` begins with `{origin}`", self.lab.spoken_name(*m)),
+            Some((m, origin)) => format!("{help}; `{}` contains `{origin}` at the start", self.lab.spoken_name(*m)),
             None => help,
         };
         let text = match each.as_slice() {

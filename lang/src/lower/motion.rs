@@ -45,8 +45,8 @@ impl<'a> Planner<'a, '_> {
                     let found = Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         at,
-                        format!("`{name}` has no part that moves at its frame `{frame}`"),
-                        "a hand would take nothing along",
+                        format!("`{name}` has no moving part at its frame `{frame}`"),
+                        "the gripper would move nothing",
                     );
                     self.lab.report(found.help(format!(
                         "give the frame `from` a joint of the asset: `frame {frame} at (0, 0, 0) mm from lid`"
@@ -145,8 +145,8 @@ impl<'a> Planner<'a, '_> {
         self.lab.report(Diagnostic::error(
             codes::MISPLACED,
             at,
-            "joints go to positions as they can",
-            "only a way to a frame is straight, driven, upright or tilted, or one by a shift straight",
+            "a move to joint positions takes no manner",
+            "only a move to a frame can be `straight`, `driving`, `upright` or `tilted`, and a shift only `straight`",
         ));
         None
     }
@@ -208,8 +208,8 @@ impl<'a> Planner<'a, '_> {
             self.lab.report(Diagnostic::error(
                 codes::TYPE_MISMATCH,
                 e.span,
-                "a thing is gripped at a frame of its own",
-                "a frame of something else",
+                "a thing must be gripped at one of its own frames",
+                "a frame of another thing",
             ));
             return None;
         }

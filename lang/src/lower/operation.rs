@@ -118,8 +118,8 @@ impl<'a> Planner<'a, '_> {
                 self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     clause.span,
-                    "one step of a robot is one motion",
-                    "a second motion",
+                    "one step of a robot can have only one motion",
+                    "the second motion",
                 ));
                 return None;
             }
@@ -323,8 +323,8 @@ impl<'a> Planner<'a, '_> {
                 ClauseKind::Presumes { .. } | ClauseKind::Warns { .. } => self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     clause.span,
-                    "a skill with steps neither presumes nor warns",
-                    "belongs to a command or an `extern skill`",
+                    "a skill with a body can have neither `presumes` nor `warns`",
+                    "for a command or an `extern skill`",
                 )),
                 ClauseKind::While(e) => invariants.extend(self.condition(e, inner)),
                 ClauseKind::Effect(effects) => {
@@ -336,8 +336,8 @@ impl<'a> Planner<'a, '_> {
                 ClauseKind::Until(e) => self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     e.span,
-                    "a skill with a body lasts as long as its steps",
-                    "`until` belongs to a command",
+                    "a skill with a body cannot have `until`: it lasts as long as its steps",
+                    "`until` is for a command",
                 )),
                 ClauseKind::Moves { .. }
                 | ClauseKind::Grips { .. }
@@ -346,8 +346,8 @@ impl<'a> Planner<'a, '_> {
                     self.lab.report(Diagnostic::error(
                         codes::MISPLACED,
                         clause.span,
-                        "a skill with a body moves as its steps do",
-                        "belongs to an `extern skill` or a command",
+                        "a skill with a body cannot have a motion: its steps move",
+                        "for an `extern skill` or a command",
                     ));
                 }
                 ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => {}
@@ -361,11 +361,12 @@ impl<'a> Planner<'a, '_> {
         let (target, value) = match effect {
             Effect::Assign(target, value) => (target, value),
             Effect::Call(e) => {
-                self.lab.report(crate::declare::types::unsupported(e.span, "promised transfers"));
+                self.lab
+                    .report(crate::declare::types::unsupported(e.span, "transfers as effects of a skill with a body"));
                 return None;
             }
             Effect::Each { set, .. } => {
-                self.lab.report(crate::declare::types::unsupported(set.span, "promises of each of a set"));
+                self.lab.report(crate::declare::types::unsupported(set.span, "effects for each of a set"));
                 return None;
             }
         };

@@ -40,10 +40,10 @@ impl<'a> Planner<'a, '_> {
                 let lab = self.lab.lab_name;
                 let lab_text = self.text(lab);
                 let wanted = self.wanted(p, ty);
-                let headline = format!("nothing in `{lab_text}` can be `{name}`");
+                let headline = format!("no thing in `{lab_text}` can be `{name}`");
                 let label = format!("must be {wanted}");
                 let mut d = Diagnostic::error(codes::UNBOUND_ROLE, p.name.span, headline, label);
-                d = d.because(lab, "the instances of this lab were looked at");
+                d = d.because(lab, "no thing of this lab fits");
                 d.help.extend(self.refusals(&all));
                 self.lab.report(d);
                 Value::Error
@@ -52,15 +52,15 @@ impl<'a> Planner<'a, '_> {
                 let name_of = |i: &InstanceId| format!("`{}`", self.lab.instances[i.0 as usize].name);
                 let mut names: Vec<String> = many.iter().take(MOST_FITTING).map(name_of).collect();
                 let more = many.len() - names.len();
-                names.extend((more > 0).then(|| format!("{more} others")));
-                let headline = format!("`{name}` may be {}: which one?", names.join(" or "));
+                names.extend((more > 0).then(|| format!("{more} more")));
+                let headline = format!("`{name}` could be {}: choose one", names.join(" or "));
                 let first = self.lab.instances[many[0].0 as usize].name.clone();
-                let mut d = Diagnostic::error(codes::UNBOUND_ROLE, p.name.span, headline, "several fit");
+                let mut d = Diagnostic::error(codes::UNBOUND_ROLE, p.name.span, headline, "several things fit");
                 for i in many.iter().take(MOST_FITTING) {
                     let inst = &self.lab.instances[i.0 as usize];
                     d = d.because(inst.span, format!("`{}` fits", inst.name));
                 }
-                self.lab.report(d.help(format!("say which, with `--set {name}={first}` or in the `run` of a test")));
+                self.lab.report(d.help(format!("choose with `--set {name}={first}`, or in the `run` of a test")));
                 Value::Error
             }
         }
@@ -73,7 +73,7 @@ impl<'a> Planner<'a, '_> {
         let name = self.lab.instances[id.0 as usize].name.clone();
         let headline = format!("`{name}` cannot be `{}`: {reason}", p.name.text);
         let d = Diagnostic::error(codes::UNBOUND_ROLE, span, headline, "does not fit");
-        self.lab.report(d.because(condition.span, "asked for here"));
+        self.lab.report(d.because(condition.span, "required here"));
         Value::Error
     }
 
@@ -88,7 +88,7 @@ impl<'a> Planner<'a, '_> {
             }
             let missing = kinds.iter().find(|k| !self.lab.instance_is(id, **k));
             let refused = match (missing, condition_of(p)) {
-                (Some(kind), _) => Some(format!("no {}", self.lab.tables.kind_name(*kind))),
+                (Some(kind), _) => Some(format!("not a {}", self.lab.tables.kind_name(*kind))),
                 (None, Some(condition)) => self.refused(p, id, condition, scope),
                 (None, None) => None,
             };
@@ -102,17 +102,17 @@ impl<'a> Planner<'a, '_> {
         scope.bind(p.name.text.clone(), Value::Instance(id));
         let found = self.condition(condition, scope);
         scope.vars.pop();
-        let Some(found) = found else { return Some(format!("`{}` has no meaning for it", self.text(condition.span))) };
+        let Some(found) = found else { return Some(format!("`{}` does not apply to it", self.text(condition.span))) };
         match self.lab.known(found.node) {
             None => {
                 self.lab.report(
                     Diagnostic::error(
                         codes::MISPLACED,
                         condition.span,
-                        "who takes a role is decided before the run",
+                        "`where` is decided before the run and cannot depend on it",
                         "depends on the run",
                     )
-                    .help("ask for parameters here, and for states with `needs` or `expect`"),
+                    .help("use only parameters here; check states with `needs` or `expect`"),
                 );
                 Some(format!("`{}` depends on the run", found.text))
             }
@@ -120,7 +120,7 @@ impl<'a> Planner<'a, '_> {
             Some(_) => {
                 let measured = found.compared.first().and_then(|c| Some(c.unit.show(self.lab.glance(c.value)?)));
                 let measured = measured.map_or_else(String::new, |m| format!(" (it is {m})"));
-                Some(format!("`{}` does not hold{measured}", found.text))
+                Some(format!("`{}` is false{measured}", found.text))
             }
         }
     }
@@ -133,7 +133,7 @@ impl<'a> Planner<'a, '_> {
             Some(format!("`{name}` ({}): {reason}", self.lab.kind_names(c.id)))
         };
         let mut lines: Vec<String> = all.iter().filter_map(line).collect();
-        lines.sort_by_key(|l| l.contains("): no "));
+        lines.sort_by_key(|l| l.contains("): not a "));
         let more = lines.len().saturating_sub(MOST_REFUSED);
         lines.truncate(MOST_REFUSED);
         lines.extend((more > 0).then(|| format!("and {more} more")));
@@ -173,9 +173,9 @@ impl<'a> Planner<'a, '_> {
                 None if optional || p.default.is_some() => {}
                 None => {
                     let wanted = self.wanted(p, &Type::Instance { kinds, optional });
-                    let nearest = self.refusals(&all).into_iter().find(|l| !l.contains("): no "));
+                    let nearest = self.refusals(&all).into_iter().find(|l| !l.contains("): not a "));
                     let nearest = nearest.map_or_else(String::new, |l| format!("; {l}"));
-                    out.push(format!("nothing can be `{}`, {wanted}{nearest}", p.name.text));
+                    out.push(format!("no thing can be `{}`, {wanted}{nearest}", p.name.text));
                 }
             }
         }

@@ -224,7 +224,7 @@ impl<'a> Planner<'a, '_> {
                     self.messages(&exchange.sends, &mut scope);
                 }
                 WireKind::Fixed { condition: Some(condition), .. } => {
-                    self.not_said(driver.transport, condition.span, "conditions of lines");
+                    self.not_said(driver.transport, condition.span, "conditions");
                 }
                 WireKind::Fixed { when, exchange, .. } if when.text == OPEN => {
                     self.only_sends(driver.transport, wire, exchange);
@@ -234,7 +234,7 @@ impl<'a> Planner<'a, '_> {
                     let what = format!("lines for `{}`", when.text);
                     self.not_said(driver.transport, wire.span, &what);
                 }
-                WireKind::Alive { .. } => self.not_said(driver.transport, wire.span, "lines that are repeated"),
+                WireKind::Alive { .. } => self.not_said(driver.transport, wire.span, "repeated lines"),
                 WireKind::Reading { .. } | WireKind::Hears { .. } => {
                     self.not_said(driver.transport, wire.span, "readings")
                 }
@@ -254,14 +254,14 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn not_said(&mut self, transport: &Name, span: Span, what: &str) {
-        let headline = format!("`{}` is written to a file, in which there are no {what}", transport.text);
-        self.lab.report(Diagnostic::error(codes::MISPLACED, span, headline, "leave this out"));
+        let headline = format!("`{}` is written to a file, and a file has no {what}", transport.text);
+        self.lab.report(Diagnostic::error(codes::MISPLACED, span, headline, "remove this"));
     }
 
     fn no_command(&mut self, sig: &Sig, device: &Path) {
         let kind = device.segments.last().map_or("", |n| n.text.as_str());
         let headline = format!("`{kind}` has no command of the form `{}`", self.form(sig));
         let d = Diagnostic::about(kind, codes::UNKNOWN_VERB, sig.span, headline, "not one of its commands");
-        self.lab.report(d.help("a line has the words, labels and numbers of parameters of the command"));
+        self.lab.report(d.help("use the verb, labels and number of parameters of the command"));
     }
 }

@@ -52,10 +52,10 @@ impl<'a> Planner<'a, '_> {
                                 codes::TYPE_MISMATCH,
                                 call.span,
                                 "this step has no result",
-                                "gives nothing to name",
+                                "returns nothing",
                             )
                             .because(name.span, "named here")
-                            .help("a skill gives a result with `return` and says so with `-> Type`"),
+                            .help("a skill returns a result with `return` and declares it with `-> Type`"),
                         );
                     }
                 }
@@ -67,10 +67,10 @@ impl<'a> Planner<'a, '_> {
                         Diagnostic::error(
                             codes::DUPLICATE_NAME,
                             name.span,
-                            format!("there are two steps `{}`", name.text),
-                            "named again here",
+                            format!("two steps have the name `{}`", name.text),
+                            "used again here",
                         )
-                        .help("give it another name, so that `.start` and `.end` say which is meant"),
+                        .help("choose another name, so that `.start` and `.end` are unambiguous"),
                     );
                 }
                 let seconds = self.seconds();
@@ -140,7 +140,7 @@ impl<'a> Planner<'a, '_> {
                 let condition = self.deciding(cond, scope)?;
                 let Some(max) = max else {
                     self.lab.report(
-                        Diagnostic::error(codes::MISSING_FIELD, s.span, "a loop needs a bound", "could go on for ever")
+                        Diagnostic::error(codes::MISSING_FIELD, s.span, "a loop needs a bound", "could run forever")
                             .help("write `repeat while ... max 100 { }`"),
                     );
                     return None;
@@ -184,8 +184,8 @@ impl<'a> Planner<'a, '_> {
                         Diagnostic::error(
                             codes::MISPLACED,
                             s.span,
-                            "`retry` stands only in a failure handler",
-                            "nothing failed here",
+                            "`retry` is only for failure handlers",
+                            "not in a handler",
                         )
                         .help("write `{ ... } on slip { retry 2 }`"),
                     );
@@ -221,8 +221,11 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Await { name } => {
                 if !self.jobs.contains(&name.text) {
                     let near = crate::near::nearest(&name.text, &self.jobs);
-                    let mut d =
-                        crate::near::unknown(name, format!("no job `{}` was started", name.text), "not started above");
+                    let mut d = crate::near::unknown(
+                        name,
+                        format!("no job `{}` is started before this", name.text),
+                        "not started",
+                    );
                     d.help.extend(crate::near::question(&near));
                     self.lab.report(d);
                     return None;
@@ -258,10 +261,10 @@ impl<'a> Planner<'a, '_> {
                     Diagnostic::error(
                         codes::MISPLACED,
                         s.span,
-                        "`run` begins a test of a workflow",
-                        "not the first statement of such a test",
+                        "`run` must be the first statement of a test",
+                        "not the first statement",
                     )
-                    .help("a test with steps of its own, `test NAME in LAB { }`, runs no workflow"),
+                    .help("a test with its own steps, `test NAME in LAB { }`, cannot run a workflow"),
                 );
                 return None;
             }
@@ -285,9 +288,9 @@ impl<'a> Planner<'a, '_> {
         for (i, (name, block)) in handlers.on.iter().enumerate() {
             self.check_failure(name);
             if let Some((first, _)) = handlers.on[..i].iter().find(|(n, _)| n.text == name.text) {
-                let headline = format!("`{}` is handled twice here", name.text);
-                let d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "never gets its turn");
-                self.lab.report(d.because(first.span, "the first handler takes it"));
+                let headline = format!("`{}` has two handlers here", name.text);
+                let d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "this handler never runs");
+                self.lab.report(d.because(first.span, "this handler takes it"));
             }
             self.handlers += 1;
             let step = self.block(block, scope);
@@ -302,8 +305,8 @@ impl<'a> Planner<'a, '_> {
     /// A name that would hide an instance of the lab is reported.
     fn unshadowed(&mut self, name: &Name, scope: &Scope) {
         let Some(hidden) = self.lab.of_lab(&name.text, scope) else { return };
-        let headline = format!("`{}` is a name of the lab already", name.text);
-        let mut d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "would hide it");
+        let headline = format!("the lab already has the name `{}`", name.text);
+        let mut d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "would hide the one of the lab");
         if let Value::Instance(id) = hidden {
             d = d.because(self.lab.instances[id.0 as usize].span, "declared here");
         }
@@ -329,7 +332,7 @@ impl<'a> Planner<'a, '_> {
         let node = self.time_node(e, scope, what)?;
         if self.lab.graph.constant(node).is_some_and(|v| v < 0.0) {
             let headline = "a duration cannot be negative";
-            self.lab.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "before it begins"));
+            self.lab.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "negative duration"));
             return None;
         }
         Some(node)
@@ -362,8 +365,8 @@ impl<'a> Planner<'a, '_> {
                     self.lab.report(Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         e.span,
-                        "how often is a whole number",
-                        "not a whole number",
+                        "the number of turns must be a whole number, 0 or more",
+                        "not such a number",
                     ));
                     return None;
                 }
@@ -487,11 +490,11 @@ impl<'a> Planner<'a, '_> {
         let v = self.lab.expr(value, scope);
         let Some(Some(slot)) = self.results.last().cloned() else {
             let (headline, help) = if self.results.is_empty() {
-                ("`return` stands only in a skill", "a workflow has no result; use `record` or `expect`")
+                ("`return` is only for skills", "a workflow has no result; use `record` or `expect`")
             } else {
-                ("this skill declares no result", "say what it gives in its signature: `-> Mass`")
+                ("this skill declares no result", "declare the type of the result in its signature: `-> Mass`")
             };
-            self.lab.report(Diagnostic::error(codes::MISPLACED, span, headline, "nothing takes this value").help(help));
+            self.lab.report(Diagnostic::error(codes::MISPLACED, span, headline, "this value is not used").help(help));
             return None;
         };
         let Value::Num(n) = self.lab.coerce(v, &slot.ty, value.span, "result") else {
@@ -515,7 +518,7 @@ impl<'a> Planner<'a, '_> {
         let v = self.lab.expr(value, scope);
         let interval = self.duration_node(every, scope, "every")?;
         if self.lab.graph.constant(interval) == Some(0.0) {
-            let headline = "an interval of `record` cannot be 0";
+            let headline = "the interval of `record` cannot be 0";
             self.lab.report(Diagnostic::error(
                 codes::TYPE_MISMATCH,
                 every.span,
@@ -585,8 +588,8 @@ impl<'a> Planner<'a, '_> {
                         Diagnostic::error(
                             codes::MISSING_FIELD,
                             p.name.span,
-                            format!("`{}` has no value", p.name.text),
-                            "no default",
+                            format!("parameter `{}` has no value", p.name.text),
+                            "it has no default",
                         )
                         .help(format!("give it with `--set {}=...`, or add a default `= ...`", p.name.text)),
                     );

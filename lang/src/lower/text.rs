@@ -212,13 +212,13 @@ impl<'a> Planner<'a, '_> {
         let near = near::nearest(&name.text, self.failures.iter());
         let mut d = near::unknown(
             name,
-            format!("nothing fails with `{}`", name.text),
+            format!("no step can fail with `{}`", name.text),
             "no step or skill declares this failure",
         );
         d = near::proposed(d, &near, name.span);
         if near.is_empty() {
             d = d.help(
-                "a run itself fails with `timeout`, `late`, `max` or `broken`; `on failure` takes whatever comes",
+                "the language itself raises `timeout`, `late`, `max` and `broken`; `on failure` takes every failure",
             );
         }
         self.lab.report(d);

@@ -198,7 +198,7 @@ impl<'a> Names<'a> {
                     // `std` alone is no module: of `use std::NAME` the module is all of it.
                     let wanted = candidates.iter().find(|c| c.contains("::")).unwrap_or(&candidates[0]);
                     let near = near::nearest(wanted, self.modules.iter().map(|m| &m.name));
-                    let headline = format!("there is no module `{wanted}`");
+                    let headline = format!("unknown module `{wanted}`");
                     let d = Diagnostic::error(codes::UNKNOWN_MODULE, path.span, headline, "imported here");
                     // What is imported from the module stays as it is.
                     let end = path.segments.get(wanted.matches("::").count()).map_or(path.span.end, |s| s.span.end);
@@ -258,8 +258,8 @@ impl<'a> Names<'a> {
             return (!declared).then(|| self.not_in_module(name, from));
         }
         let near = near::nearest(&front, self.modules.iter().map(|m| &m.name));
-        let headline = format!("there is no module `{front}` here");
-        let mut d = Diagnostic::about(&front, codes::UNKNOWN_NAME, path.span, headline, "not imported");
+        let headline = format!("the module `{front}` is not imported");
+        let mut d = Diagnostic::about(&front, codes::UNKNOWN_NAME, path.span, headline, "no such name here");
         d.help.extend(near::question(&near));
         Some(d.help(format!("import it: `use {front}`")))
     }
@@ -350,7 +350,7 @@ impl<'a> Names<'a> {
     pub fn unknown(&self, module: usize, name: &Name, what: &str, fits: impl Fn(&ItemKind) -> bool) -> Diagnostic {
         let candidates = self.visible(module).filter(|(_, id)| fits(&self.decl(*id).item.kind)).map(|(n, _)| n);
         let near = near::nearest(&name.text, candidates);
-        let mut d = near::unknown(name, format!("there is no {what} `{}`", name.text), "not declared");
+        let mut d = near::unknown(name, format!("unknown {what} `{}`", name.text), "not declared");
         if let Some(import) = self.import_of(module, &name.text, &fits) {
             d = import.offered(d);
         } else {

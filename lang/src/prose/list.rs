@@ -50,7 +50,7 @@ impl List {
     fn write(&self, indent: usize, out: &mut Vec<String>) {
         let blank = " ".repeat(indent);
         if self.steps.is_empty() {
-            out.push(format!("{blank}Nothing is done."));
+            out.push(format!("{blank}No step."));
         }
         for (i, step) in self.steps.iter().enumerate() {
             let mark = if self.at_once { "-".to_string() } else { format!("{}.", i + 1) };

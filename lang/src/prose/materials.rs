@@ -19,7 +19,7 @@ impl Prose<'_, '_> {
         out.push("## What you need".to_string());
         out.push(self.things());
         if let Some(reagents) = self.reagents(&held) {
-            out.push("Measured out, as computed from what the vessels hold:".to_string());
+            out.push("Amounts computed from the contents of the vessels:".to_string());
             out.push(reagents);
         }
         if let Some(safety) = self.safety() {
@@ -151,8 +151,7 @@ impl Prose<'_, '_> {
         }
         lines.push(String::new());
         lines.push(
-            "This is a screen: it lists what is recorded of the single substances and says nothing of their mixtures, \
-             amounts or the room. What it does not name may be dangerous all the same. Read the safety data sheets."
+            "This is a screen: it lists recorded hazards of the single substances and does not judge mixtures, amounts or the room. Other substances may still be dangerous. Read the safety data sheets."
                 .to_string(),
         );
         Some(lines.join("\n"))

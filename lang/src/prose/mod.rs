@@ -98,7 +98,7 @@ impl<'a> Prose<'a, '_> {
         }
         if let Some(finally) = &handlers.finally {
             out.push("### In any case, at the end".to_string());
-            out.push("Also when something went wrong or the work was broken off:".to_string());
+            out.push("Also after a failure or if the work was stopped:".to_string());
             out.push(self.block(finally).markdown());
         }
     }

@@ -106,12 +106,12 @@ impl<'a> Prose<'a, '_> {
                 )
             }
             StmtKind::Keep { cond, body, handlers } => {
-                let text = format!("Do the following, and see to it all the while that {}:", self.condition(cond));
+                let text = format!("Do the following, and make sure throughout that {}:", self.condition(cond));
                 let list = self.block(body);
                 self.guarded(Step::with(text, list), handlers)
             }
             StmtKind::Within { limit, since, body, handlers } => {
-                let text = format!("Within {} after {}, begin with this:", self.say(limit), self.say(since));
+                let text = format!("Within {} after {}, start this:", self.say(limit), self.say(since));
                 let list = self.block(body);
                 self.guarded(Step::with(text, list), handlers)
             }
@@ -143,12 +143,12 @@ impl<'a> Prose<'a, '_> {
             StmtKind::Parallel { body, handlers } => {
                 let list = List { at_once: true, ..self.block(body) };
                 self.guarded(
-                    Step::with("Do all of this at the same time, and go on when all of it is done:", list),
+                    Step::with("Do all of this at the same time, and continue when all of it is done:", list),
                     handlers,
                 )
             }
             StmtKind::Start { name, body } => {
-                let text = format!("Begin with “{}”, and go on meanwhile:", words::plain(&name.text));
+                let text = format!("Start “{}”, and continue meanwhile:", words::plain(&name.text));
                 Step::with(text, self.block(body))
             }
             StmtKind::Await { name } => Step::new(format!("Wait until “{}” is done.", words::plain(&name.text))),
@@ -163,11 +163,11 @@ impl<'a> Prose<'a, '_> {
                 self.guarded(step, handlers)
             }
             StmtKind::Retry { times } => {
-                Step::new(format!("Begin again with the work that failed, up to {} times.", self.say(times)))
+                Step::new(format!("Repeat the failed steps, up to {} times.", self.say(times)))
             }
             StmtKind::Claim { assets, body } => {
                 let all: Vec<String> = assets.iter().map(|a| self.say(a)).collect();
-                let text = format!("Keep {} free for this and for nothing else:", joined(&all, "and"));
+                let text = format!("Reserve {} for these steps:", joined(&all, "and"));
                 Step::with(text, self.block(body))
             }
             StmtKind::Fail { name, text } => {
@@ -237,9 +237,9 @@ impl<'a> Prose<'a, '_> {
     pub(super) fn failure(&self, name: &str) -> String {
         match name {
             "timeout" => "If it takes longer".to_string(),
-            "late" => "If it is too late for that".to_string(),
-            "max" => "If that is not enough".to_string(),
-            "broken" => "If that does not hold".to_string(),
+            "late" => "If it is too late".to_string(),
+            "max" => "If the condition is still not met after that".to_string(),
+            "broken" => "If that is no longer so".to_string(),
             "failure" => "If anything else goes wrong".to_string(),
             "need" => "If something that a step needs is missing".to_string(),
             other => format!("If it fails ({})", words::plain(other)),

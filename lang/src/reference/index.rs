@@ -21,10 +21,10 @@ pub fn page(library: &Library) -> String {
         })
         .collect();
     let mut out = "# The standard library, module by module\n\n".to_string();
-    out += "Written from the texts of the library (`MATTERIX_UPDATE=1 cargo test --test cli book`): types, values and conditions are those\n\
+    out += "Generated from the texts of the library (`MATTERIX_UPDATE=1 cargo test --test cli book`): types, values and conditions are those\n\
             that run. [library.md](../library.md) is the overview, with sources and remarks.\n\n";
-    out += "Names in capitals are what a call puts in their place; the device of a command may stand after `by` as well. A unit is one in\n\
-            which such a quantity can be written; every other of its dimension will do.\n\n";
+    out += "A call replaces names in capitals; the device of a command may also come after `by`. A listed unit is an example: every other\n\
+            unit of the same dimension is allowed.\n\n";
     out += &table(&["module", "in the prelude", "is about"], &rows);
     out += "## Names\n\n";
     let mut names: BTreeMap<(String, String), (&'static str, &Module)> = BTreeMap::new();

@@ -54,7 +54,7 @@ pub fn page(library: &Library, module: &Module) -> String {
         ("Species", tables::species(module)),
         ("Solutions and reactions", tables::chemistry(module)),
         ("Groups and materials", tables::groups(module)),
-        ("What must not meet", tables::pairs(module)),
+        ("Incompatible pairs", tables::pairs(module)),
         ("Dimensions", tables::dimensions(library, module)),
         ("Units", tables::units(module)),
         ("Drivers", tables::drivers(module)),

@@ -77,7 +77,7 @@ impl<'f> Types<'f> {
             Basic::Boolean => plain("Bool", format!("{{{option}}}")),
             Basic::String if constraints.set.len() > 1 => {
                 if let Some(word) = constraints.set.iter().find(|w| !matterix_syntax::is_name(w)) {
-                    return Err(format!("may be `{word}`, which is no word of the language"));
+                    return Err(format!("may be `{word}`, which is not a name of the language"));
                 }
                 plain(&constraints.set.join(" | "), format!("{{{option}}}"))
             }
@@ -131,7 +131,7 @@ impl<'f> Types<'f> {
     fn counted(&mut self, of: &SiUnit) -> Result<Counted, String> {
         let symbol = symbol(of);
         if symbol.is_empty() && of.factor == 1.0 && of.offset == 0.0 {
-            return Err(format!("is counted in `{}`, which says nothing of what it is", of.label));
+            return Err(format!("is counted in `{}`, which does not define a quantity", of.label));
         }
         let si = self.units.resolve(&symbol).map_err(|_| format!("is counted in `{}`", of.label))?;
         let is_it = |unit: &Resolved| {
@@ -145,12 +145,14 @@ impl<'f> Types<'f> {
         // A temperature is a point also where it is counted in kelvins.
         let point = found.as_ref().is_some_and(|u| u.point) || of.offset != 0.0 || symbol == "K";
         let ty = self.units.dimension_name(&si.dimension, point).or(self.units.dimension_name(&si.dimension, false));
-        let ty = ty.ok_or_else(|| format!("is counted in `{}`, of which there is no quantity", of.label))?.to_owned();
+        let ty = ty
+            .ok_or_else(|| format!("is counted in `{}`, for which the language has no quantity", of.label))?
+            .to_owned();
         if let Some(found) = found {
             return Ok(Counted { ty, unit: found.unit.symbol.clone() });
         }
         if of.offset != 0.0 {
-            return Err(format!("is counted in `{}`, of which there is no such scale", of.label));
+            return Err(format!("is counted in `{}`, for which the language has no such scale", of.label));
         }
         if let Some((_, name, _)) = self.declared.iter().find(|(unit, ..)| unit == of) {
             return Ok(Counted { ty, unit: name.clone() });

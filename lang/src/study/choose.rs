@@ -28,7 +28,7 @@ pub fn choose(
     match (wanted, all.as_slice()) {
         (None, [(_, id)]) => Ok(*id),
         (_, []) => {
-            let headline = format!("there is no {what} in this file");
+            let headline = format!("this file has no {what}");
             let d = Diagnostic::error(codes::NO_WORKFLOW, top, headline, "nothing to run");
             Err(Box::new(d.help(format!("add `{what} NAME of WORKFLOW {{ ... }}`"))))
         }
@@ -36,8 +36,8 @@ pub fn choose(
             Some((_, id)) => Ok(*id),
             None => {
                 let near = near::nearest(wanted, all.iter().map(|(name, _)| &name.text));
-                let headline = format!("there is no {what} `{wanted}` in this file");
-                let mut d = Diagnostic::error(codes::NO_WORKFLOW, top, headline, "asked for with `--name`");
+                let headline = format!("this file has no {what} `{wanted}`");
+                let mut d = Diagnostic::error(codes::NO_WORKFLOW, top, headline, "given with `--name`");
                 d.help.extend(near::question(&near));
                 if near.is_empty() {
                     d = d.help(format!("it has {}", list.join(", ")));
@@ -46,12 +46,12 @@ pub fn choose(
             }
         },
         (None, [(first, _), rest @ ..]) => {
-            let headline = format!("this file has {} of these: which {what}?", all.len());
+            let headline = format!("this file declares {} of these: choose one {what}", all.len());
             let mut d = Diagnostic::error(codes::NO_WORKFLOW, first.span, headline, "one of them");
             for (other, _) in rest {
                 d = d.because(other.span, "another");
             }
-            Err(Box::new(d.help(format!("say which with `--name`: {}", list.join(", ")))))
+            Err(Box::new(d.help(format!("choose with `--name`: {}", list.join(", ")))))
         }
     }
 }

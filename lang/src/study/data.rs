@@ -20,7 +20,7 @@ pub fn read(
     let about = |headline: String, label: &str| Diagnostic::error(codes::DATA_FILE, fit.data_span, headline, label);
     let text = loader.file(fit.data_span.file, &fit.data).map_err(|reason| {
         let d = about(format!("cannot read `{}`: {reason}", fit.data), "named here");
-        Box::new(d.help("files are looked for from the folder of the file that is checked"))
+        Box::new(d.help("paths are relative to the folder of the checked file"))
     })?;
     let file = sources.add(&fit.data, text.clone());
     if let Some(hidden) = hidden::characters(file, &text).into_iter().find(Diagnostic::is_error) {
@@ -37,7 +37,7 @@ pub fn read(
         records.push(record.map_err(|e| Box::new(table.broken(&e)))?);
     }
     let Some((header, body)) = records.split_first() else {
-        return Err(Box::new(about(format!("there is no table in `{}`", fit.data), "named here")));
+        return Err(Box::new(about(format!("`{}` contains no table", fit.data), "named here")));
     };
     let columns: Vec<Header<'_>> = header.iter().map(Header::of).collect();
     let time = table.time(&columns, header, tables)?;
@@ -52,7 +52,12 @@ pub fn read(
             return Err(Box::new(table.at(record, time.0, "this row has no time", "empty")));
         };
         if at < 0.0 {
-            return Err(Box::new(table.at(record, time.0, "this row lies before the run began", "negative")));
+            return Err(Box::new(table.at(
+                record,
+                time.0,
+                "the time of this row is before the start of the run",
+                "negative",
+            )));
         }
         let mut values = Vec::new();
         for (m, column) in fit.matches.iter().zip(&matched) {
@@ -67,8 +72,8 @@ pub fn read(
     // Where the noise is learnt from what is left over, something must be left over.
     let least = fit.estimates.len() + usize::from(fit.matches.iter().any(|m| m.noise.is_none()));
     if values < least {
-        let headline = format!("too few values: {values} for parameters in the number of {}", fit.estimates.len());
-        let d = about(headline, "holds too few").help(format!("{least} are needed at least"));
+        let headline = format!("too few values: {values} values for {} parameters", fit.estimates.len());
+        let d = about(headline, "has too few").help(format!("at least {least} values are needed"));
         return Err(Box::new(d));
     }
     fit.rows = rows;
@@ -109,9 +114,9 @@ impl Table<'_> {
             Ok(value) if value.is_finite() => Ok(Some(value)),
             _ => {
                 let d = self.at(record, column, &format!("`{cell}` is not a number"), "not a number");
-                Err(Box::new(
-                    d.help("numbers have a point, no unit and no thousands: `0.913`; a value that is missing, nothing"),
-                ))
+                Err(Box::new(d.help(
+                    "use a decimal point, no unit and no thousands separator: `0.913`; leave missing values empty",
+                )))
             }
         }
     }
@@ -124,7 +129,7 @@ impl Table<'_> {
         tables: &Tables<'_>,
     ) -> Result<(usize, Unit), Box<Diagnostic>> {
         let Some(index) = columns.iter().position(|c| c.name == "time") else {
-            let d = self.at(header, 0, "this table has no column `time`", "the first row names the columns");
+            let d = self.at(header, 0, "this table has no column `time`", "the first row must name the columns");
             return Err(Box::new(d.help("call it `time`, in seconds, or `time [min]`")));
         };
         let Some(symbol) = columns[index].unit else { return Ok((index, Unit::scaled("s", 1.0))) };
@@ -155,15 +160,16 @@ impl Table<'_> {
         match found.as_slice() {
             [one] => match columns[*one].unit {
                 Some(symbol) if symbol != unit.symbol => {
-                    let headline = format!("the column `{wanted}` is in `{symbol}`, and read as `{}`", unit.symbol);
-                    let d = self.at(header, *one, &headline, "says its unit here");
-                    Err(Box::new(d.because(asked, "read here").help("the header and `as` must say the same unit")))
+                    let headline =
+                        format!("the column `{wanted}` is in `{symbol}`, but it is read as `{}`", unit.symbol);
+                    let d = self.at(header, *one, &headline, "the unit of the column");
+                    Err(Box::new(d.because(asked, "read here").help("the header and `as` must give the same unit")))
                 }
                 _ => Ok(*one),
             },
             [] => {
                 let near = near::nearest(wanted, columns.iter().map(|c| c.name));
-                let headline = format!("there is no column `{wanted}` in this table");
+                let headline = format!("this table has no column `{wanted}`");
                 let mut d = Diagnostic::error(codes::DATA_FILE, asked, headline, "not in the table");
                 d = d.because(self.named, "the table");
                 d.help.extend(near::question(&near));
@@ -174,8 +180,8 @@ impl Table<'_> {
                 Err(Box::new(d))
             }
             [_, second, ..] => {
-                let headline = format!("two columns are called `{wanted}`");
-                Err(Box::new(self.at(header, *second, &headline, "again").because(asked, "asked for here")))
+                let headline = format!("two columns have the name `{wanted}`");
+                Err(Box::new(self.at(header, *second, &headline, "again").because(asked, "used here")))
             }
         }
     }
@@ -209,7 +215,7 @@ impl Table<'_> {
     fn broken(&self, error: &csv::Error) -> Diagnostic {
         let (line, headline) = match error.kind() {
             csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
-                let headline = format!("this row has {len} cells, and the first row has {expected_len}");
+                let headline = format!("this row has {len} cells, but the first row has {expected_len}");
                 (pos.as_ref().map(csv::Position::byte), headline)
             }
             csv::ErrorKind::Utf8 { pos, .. } => (pos.as_ref().map(csv::Position::byte), "this row is not text".into()),

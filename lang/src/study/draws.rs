@@ -34,9 +34,9 @@ pub(super) fn draw<'a>(
         ("uniform", []) => Some(Draw::Uniform),
         ("sobol", []) => Some(Draw::Sobol),
         ("grid", [n]) if n.name.as_ref().is_none_or(|name| name.text == "n") => {
-            let n = count(lab, &n.value, scope, "how many values a grid has").filter(|n| {
+            let n = count(lab, &n.value, scope, "the number of values of a grid").filter(|n| {
                 if *n < 2 {
-                    wrong(lab, word.span, "a grid has two values at least: both ends", "write `grid(2)`, or more");
+                    wrong(lab, word.span, "a grid needs at least two values, both ends", "write `grid(2)`, or more");
                 }
                 *n >= 2
             })?;
@@ -56,19 +56,19 @@ pub(super) fn draw<'a>(
                 Some(_) => other.name.as_ref().filter(|n| n.text == name).map(|_| &other.value),
             };
             let (Some(mean), Some(sd)) = (at("mean", mean, sd), at("sd", sd, mean)) else {
-                return wrong(lab, word.span, "a normal distribution has a `mean` and an `sd`", NORMAL);
+                return wrong(lab, word.span, "a normal distribution needs a `mean` and an `sd`", NORMAL);
             };
             let ty = |point| Type::Quantity { dimension: named.dimension.clone(), point, optional: false };
             let Value::Num(mean) = lab.typed(mean, &ty(named.point), scope, "mean") else { return None };
             let Value::Num(spread) = lab.typed(sd, &ty(false), scope, "sd") else { return None };
             let (mean, spread) = lab.known(mean.node).zip(lab.known(spread.node))?;
             if !(spread > 0.0 && spread.is_finite() && mean.is_finite()) {
-                let headline = "a standard deviation is above nothing";
+                let headline = "a standard deviation must be above 0";
                 lab.report(Diagnostic::error(codes::OUT_OF_RANGE, sd.span, headline, "not a standard deviation"));
                 return None;
             }
             if mean < free.low - 6.0 * spread || mean > free.high + 6.0 * spread {
-                let headline = "next to nothing of this distribution lies in the range";
+                let headline = "almost none of this distribution lies in the range";
                 let d = Diagnostic::error(codes::OUT_OF_RANGE, word.span, headline, "its mean is far outside");
                 lab.report(d);
                 return None;
@@ -76,16 +76,16 @@ pub(super) fn draw<'a>(
             Some(Draw::Normal(mean, spread))
         }
         ("uniform" | "sobol", _) => {
-            wrong(lab, word.span, "this way to draw takes no arguments", "write the word alone")
+            wrong(lab, word.span, "this distribution takes no arguments", "write the word alone")
         }
-        ("grid", _) => wrong(lab, word.span, "a grid has a number of values", "write `grid(5)`"),
-        ("normal", _) => wrong(lab, word.span, "a normal distribution has a `mean` and an `sd`", NORMAL),
+        ("grid", _) => wrong(lab, word.span, "a grid needs the number of its values", "write `grid(5)`"),
+        ("normal", _) => wrong(lab, word.span, "a normal distribution needs a `mean` and an `sd`", NORMAL),
         _ => {
             let near = near::nearest(&word.text, DRAWS.iter().copied());
-            let headline = format!("there is no way to draw called `{}`", word.text);
-            let mut d = near::unknown(word, headline, "not a way to draw");
+            let headline = format!("unknown distribution `{}`", word.text);
+            let mut d = near::unknown(word, headline, "not a distribution");
             d.help.extend(near::question(&near));
-            lab.report(d.help("there are `uniform`, `sobol`, `grid(n)` and `normal(mean: ..., sd: ...)`"));
+            lab.report(d.help("use `uniform`, `sobol`, `grid(n)` or `normal(mean: ..., sd: ...)`"));
             None
         }
     }
@@ -94,8 +94,8 @@ pub(super) fn draw<'a>(
 const NORMAL: &str = "write `normal(mean: 76 degC, sd: 2 K)`; values outside the range are not drawn";
 
 fn not_whole(lab: &mut Elaborator<'_>, free: &Free, at: Span) -> Option<Draw> {
-    let headline = format!("`{}` is a whole number, and these values are not", free.name);
-    let d = Diagnostic::error(codes::CANNOT_VARY, at, headline, "between whole numbers");
+    let headline = format!("`{}` must be a whole number, but these values are not", free.name);
+    let d = Diagnostic::error(codes::CANNOT_VARY, at, headline, "values between whole numbers");
     lab.report(d.help("write `by grid(n)` with a range and an `n` that give whole numbers: `in 1 .. 5 by grid(5)`"));
     None
 }
@@ -105,7 +105,7 @@ pub(super) fn count<'a>(lab: &mut Elaborator<'a>, e: &'a Expr, scope: &mut Scope
     let Value::Num(n) = lab.typed(e, &Type::ratio(), scope, what) else { return None };
     let value = lab.known(n.node).filter(|v| *v >= 1.0 && v.fract() == 0.0 && *v <= MOST_RUNS as f64);
     if value.is_none() {
-        let headline = format!("{what} is a whole number from 1 to {MOST_RUNS}");
+        let headline = format!("{what} must be a whole number from 1 to {MOST_RUNS}");
         lab.report(Diagnostic::error(codes::UNUSABLE_NUMBER, e.span, headline, "not such a number"));
     }
     value.map(|v| v as u64)

@@ -100,7 +100,7 @@ fn study<'a>(
                     let d = Diagnostic::error(codes::DUPLICATE_NAME, e.span, "`runs` is given twice", "again");
                     lab.report(d.because(first, "first given here"));
                 }
-                runs = count(lab, e, scope, "how many runs");
+                runs = count(lab, e, scope, "the number of runs");
                 wrong |= runs.is_none();
             }
             StudyLine::Report { .. } => asks = true,
@@ -113,10 +113,10 @@ fn study<'a>(
     };
     let is_grid = varied.iter().any(|v| matches!(v.draw, Draw::Grid(_)));
     if !wrong && runs.is_none() && !is_grid {
-        missing(lab, format!("how many runs has `{}`?", name.text), "add a line such as `runs 1000`");
+        missing(lab, format!("`{}` has no number of runs", name.text), "add a line such as `runs 1000`");
     }
     if !wrong && !asks {
-        missing(lab, format!("`{}` reports nothing", name.text), "add a line such as `report duration = elapsed`");
+        missing(lab, format!("`{}` has no `report`", name.text), "add a line such as `report duration = elapsed`");
     }
     if let (false, Some(at)) = (wrong, first_runs) {
         let all = varied.iter().map(|v| match v.draw {
@@ -125,9 +125,9 @@ fn study<'a>(
         });
         let all = all.fold(1u64, u64::saturating_mul);
         if runs.is_some_and(|runs| all > MOST_RUNS || runs % all != 0) {
-            let headline = format!("the grids have {all} points, and the runs do not go into them evenly");
+            let headline = format!("the grids have {all} points: the number of runs must be a multiple of this");
             let d = Diagnostic::error(codes::UNUSABLE_NUMBER, at, headline, "not a multiple of the points");
-            lab.report(d.help(format!("leave `runs` out, or write a multiple of {all}")));
+            lab.report(d.help(format!("remove `runs`, or write a multiple of {all}")));
         }
     }
     Study {
@@ -155,7 +155,7 @@ fn unique(lab: &mut Elaborator<'_>, lines: &[StudyLine]) {
             let d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "again");
             lab.report(d.because(first.span, "first reported here"));
         } else if TAKEN.contains(&name.text.as_str()) {
-            let headline = format!("every table of runs has a column `{}`", name.text);
+            let headline = format!("`{}` is already a column of every table of runs", name.text);
             let d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "this report's name");
             lab.report(d.help("choose another name"));
         }
@@ -176,8 +176,11 @@ fn fit<'a>(
         match line {
             FitLine::Data(file) => {
                 if let Some(first) = data.replace(file) {
-                    let d = Diagnostic::error(codes::DUPLICATE_NAME, file.span, "there are two files of data", "again");
-                    lab.report(d.because(first.span, "the first").help("a fit is to one run: write a fit for each"));
+                    let d = Diagnostic::error(codes::DUPLICATE_NAME, file.span, "this fit has two data files", "again");
+                    lab.report(
+                        d.because(first.span, "the first")
+                            .help("a fit uses the data of one run: write one fit for each"),
+                    );
                 }
             }
             FitLine::Estimate { path, range, log } => {
@@ -188,12 +191,12 @@ fn fit<'a>(
                 };
                 if lab.open.is_whole(named.param) {
                     let headline = format!("`{}` is a whole number and cannot be estimated", free.name);
-                    let d = Diagnostic::error(codes::CANNOT_VARY, free.span, headline, "counts something");
-                    lab.report(d.help("estimates move in steps as small as they like"));
+                    let d = Diagnostic::error(codes::CANNOT_VARY, free.span, headline, "a count");
+                    lab.report(d.help("an estimate can take any value in its range"));
                 } else if *log && free.low <= 0.0 {
-                    let headline = "a logarithmic scale has no place for nothing, or less";
-                    let d = Diagnostic::error(codes::OUT_OF_RANGE, range.span, headline, "begins at or below 0");
-                    lab.report(d.help("begin above 0, or leave `log` out"));
+                    let headline = "a logarithmic scale cannot include 0 or negative values";
+                    let d = Diagnostic::error(codes::OUT_OF_RANGE, range.span, headline, "starts at or below 0");
+                    lab.report(d.help("start above 0, or remove `log`"));
                 } else {
                     estimates.push(Estimated { free, log: *log });
                 }
@@ -215,22 +218,20 @@ fn fit<'a>(
     if !lines.iter().any(|l| matches!(l, FitLine::Estimate { .. })) {
         missing(
             lab,
-            format!("`{name_text}` estimates nothing"),
+            format!("`{name_text}` has no `estimate`"),
             "add a line such as `estimate r.rate.A in 1e6 1/s .. 1e9 1/s log`",
         );
     }
     if !asks {
-        missing(lab, format!("`{name_text}` matches nothing"), "add a line such as `match x with \"column\" as mol/L`");
+        missing(lab, format!("`{name_text}` has no `match`"), "add a line such as `match x with \"column\" as mol/L`");
     }
     let matches = std::mem::take(&mut lab.open.matches);
     if matches.len() > 1
         && let Some(without) = matches.iter().find(|m| m.noise.is_none())
     {
-        let headline = format!("how much do values of `{}` count against others?", without.column);
+        let headline = format!("the weight of the values of `{}` is unknown", without.column);
         let d = Diagnostic::error(codes::MISSING_FIELD, without.column_span, headline, "without `noise`");
-        lab.report(
-            d.help("where data of several columns are matched, each needs its standard deviation: `noise 0.01 mol/L`"),
-        );
+        lab.report(d.help("if several columns are matched, each needs its standard deviation: `noise 0.01 mol/L`"));
     }
     let data = data?;
     Some(Fit {
@@ -256,14 +257,14 @@ fn free<'a, 'f>(
     let lab_name = crate::names::item_name(lab.tables.names.decl(task.lab).item).map(|n| n.0).unwrap_or_default();
     let text = super::paths::written(path).unwrap_or_default();
     if let Some(given) = task.given.iter().find(|g| g.name.text == text) {
-        let headline = format!("`{text}` is left open here, and given a value from outside");
+        let headline = format!("`{text}` varies here, but is also given a value");
         let d = Diagnostic::error(codes::DUPLICATE_NAME, given.name.span, headline, "given here");
-        lab.report(d.because(path.span, "left open here"));
+        lab.report(d.because(path.span, "varies here"));
         return None;
     }
     let named = lab.free(path, &lab_name)?;
     if let Some(first) = others.find(|o| o.param == named.param) {
-        let d = Diagnostic::error(codes::DUPLICATE_NAME, path.span, format!("`{text}` is left open twice"), "again");
+        let d = Diagnostic::error(codes::DUPLICATE_NAME, path.span, format!("`{text}` varies twice"), "again");
         lab.report(d.because(first.span, "first here"));
         return None;
     }
@@ -277,11 +278,11 @@ fn free<'a, 'f>(
     let ends = lab.known(low.node).zip(lab.known(high.node)).filter(|(a, b)| a.is_finite() && b.is_finite());
     let Some((from, to)) = ends else {
         let headline = "both ends of this range must be known before the runs";
-        lab.report(Diagnostic::error(codes::CANNOT_VARY, range.span, headline, "not known, or without an end"));
+        lab.report(Diagnostic::error(codes::CANNOT_VARY, range.span, headline, "unknown or infinite"));
         return None;
     };
     if from >= to {
-        let headline = format!("nothing is left open of `{text}`: both ends of its range are the same");
+        let headline = format!("`{text}` cannot vary: both ends of its range are equal");
         let d = Diagnostic::error(codes::EMPTY_RANGE, range.span, headline, "only one value");
         lab.report(d);
         return None;

@@ -10,8 +10,7 @@ use crate::eval::lab::free::Named;
 use crate::near;
 
 /// What may vary, for messages.
-const KINDS: &str = "what may vary: parameters of the workflow and of things, what vessels hold at the start \
-(`beaker.initial[HI]`), settings of the lab, arguments of rate laws (`reaction.rate.Ea`)";
+const KINDS: &str = "these can vary: parameters of the workflow and of things, the initial contents of vessels (`beaker.initial[HI]`), settings of the lab, arguments of rate laws (`reaction.rate.Ea`)";
 
 /// A path as the names of parameters are written; none where it is no path.
 pub fn written(e: &Expr) -> Option<String> {
@@ -35,7 +34,7 @@ impl Elaborator<'_> {
         let text = written(path);
         let Some(text) = text else {
             if !matches!(*path.kind, ExprKind::Error) {
-                let d = Diagnostic::error(codes::CANNOT_VARY, path.span, "this names nothing that may vary", "no name");
+                let d = Diagnostic::error(codes::CANNOT_VARY, path.span, "this cannot vary", "not a name");
                 self.report(d.help(KINDS));
             }
             return None;
@@ -46,10 +45,11 @@ impl Elaborator<'_> {
         let found: Vec<Named> = self.open.named(&own).cloned().collect();
         match found.as_slice() {
             [one] if self.open.is_fixed(one.param) => {
-                let headline = format!("`{text}` decides how lab or plan are built and cannot vary");
+                let headline = format!("`{text}` cannot vary: the lab or the plan depends on it");
                 let d = Diagnostic::error(codes::CANNOT_VARY, path.span, headline, "fixed before the runs");
                 self.report(
-                    d.because(one.span, "its value").help("write a lab or a workflow for each value, and study each"),
+                    d.because(one.span, "its value")
+                        .help("write a lab or a workflow for each value, and a study for each"),
                 );
                 None
             }
@@ -64,7 +64,7 @@ impl Elaborator<'_> {
                 None
             }
             [first, rest @ ..] => {
-                let headline = format!("`{text}` is given at {} places: which one?", found.len());
+                let headline = format!("`{text}` is given at {} places", found.len());
                 let mut d = Diagnostic::error(codes::AMBIGUOUS_NAME, path.span, headline, "several values");
                 d = d.because(first.span, "one of them");
                 for other in rest {
@@ -119,12 +119,12 @@ impl Elaborator<'_> {
     fn fixed_by(&self, text: &str, value: Value, path: &Expr) -> Diagnostic {
         let found = |headline: String, label: &str| Diagnostic::error(codes::CANNOT_VARY, path.span, headline, label);
         let Value::Num(n) = value else {
-            let headline = format!("`{text}` is no number and cannot vary");
+            let headline = format!("`{text}` cannot vary: it is not a number");
             return found(headline, value.what()).help(KINDS);
         };
         let below = self.graph.schedule([n.node]);
         if below.iter().any(|n| matches!(self.graph.op(*n), Op::State(_))) {
-            return found(format!("`{text}` changes in the run and cannot vary"), "not given").help(KINDS);
+            return found(format!("`{text}` cannot vary: it changes during the run"), "not given").help(KINDS);
         }
         let names: Vec<String> = below
             .iter()
@@ -135,18 +135,18 @@ impl Elaborator<'_> {
             .collect();
         match names.is_empty() {
             true => found(format!("`{text}` cannot vary"), "not given as a number").help(KINDS),
-            false => found(format!("`{text}` follows from {}", names.join(", ")), "not given by itself")
-                .help("vary what it follows from"),
+            false => found(format!("`{text}` follows from {}", names.join(", ")), "not given on its own")
+                .help("vary one of these instead"),
         }
     }
 
     fn unknown_path(&self, text: &str, own: &str, path: &Expr) -> Diagnostic {
         if self.open.leaves(own) {
-            let headline = format!("`{text}` is no number and cannot vary");
+            let headline = format!("`{text}` cannot vary: it is not a number");
             return Diagnostic::error(codes::CANNOT_VARY, path.span, headline, "not a quantity").help(KINDS);
         }
         let near = near::nearest(own, self.open.names());
-        let headline = format!("there is no parameter `{text}` here");
+        let headline = format!("unknown parameter `{text}`");
         let mut d = Diagnostic::error(codes::UNKNOWN_PARAMETER, path.span, headline, "not a parameter");
         d.help.extend(near::question(&near));
         if near.is_empty() {

@@ -88,9 +88,9 @@ impl<'a> Planner<'a, '_> {
                 _ if n.dimension.is_one() => Unit::one(),
                 _ => {
                     let symbol = self.lab.shown(&n).symbol;
-                    let headline = format!("in which unit is the column `{}`?", column.text);
+                    let headline = format!("the column `{}` needs a unit", column.text);
                     let d = Diagnostic::error(codes::MISSING_FIELD, column.span, headline, "numbers without a unit");
-                    self.lab.report(d.help(format!("say it after the column: `as {symbol}`")));
+                    self.lab.report(d.help(format!("write it after the column: `as {symbol}`")));
                     continue;
                 }
             };
@@ -102,9 +102,9 @@ impl<'a> Planner<'a, '_> {
                     let Value::Num(noise) = given else { continue };
                     let sigma = self.lab.known(noise.node).filter(|s| *s > 0.0 && s.is_finite());
                     if sigma.is_none() {
-                        let headline = "noise is a standard deviation, and above nothing";
+                        let headline = "`noise` is a standard deviation: it must be above 0";
                         let d = Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, "not a standard deviation");
-                        self.lab.report(d.help("leave it out to learn it from what the fit leaves over"));
+                        self.lab.report(d.help("remove it to estimate it from the residuals of the fit"));
                         continue;
                     }
                     sigma
@@ -130,14 +130,14 @@ impl Elaborator<'_> {
             return Value::Num(Num { literal: false, ..n.clone() });
         }
         let Some(first) = self.open.following else {
-            let headline = format!("`{name}` is known only when a run has ended");
+            let headline = format!("`{name}` is known only after a run");
             let d = Diagnostic::error(codes::MISPLACED, at, headline, "not in a report");
-            self.report(d.help("it stands in the `report` of a `study`"));
+            self.report(d.help("use it in the `report` of a `study`"));
             return Value::Error;
         };
         if self.graph.depends(n.node, |op| matches!(op, Op::Local(i) if *i >= first)) {
-            let headline = format!("`{name}` cannot follow what is itself known only when the run has ended");
-            let d = Diagnostic::about(name, codes::WRONG_ARGUMENTS, at, headline, "one over time within another");
+            let headline = format!("`{name}` cannot use a value that is itself known only after the run");
+            let d = Diagnostic::about(name, codes::WRONG_ARGUMENTS, at, headline, "nested in another one");
             self.report(d);
             return Value::Error;
         }

@@ -106,7 +106,7 @@ impl Balance<'_> {
                     codes::SYNTAX,
                     span,
                     "this text has no closing quote",
-                    "a text ends on its line, with `\"`",
+                    "a text must end on its own line, with `\"`",
                 )
                 .guess("close the text", self.span(open.end, open.end), "\""),
             );
@@ -265,8 +265,8 @@ impl Balance<'_> {
     fn stray(&mut self, bracket: Bracket) {
         let span = self.span(bracket.at, bracket.at + 1);
         self.changes.push(Change { at: bracket.at, remove: 1, insert: " " });
-        let headline = format!("`{}` closes nothing", char::from(bracket.byte));
-        self.found.push(Diagnostic::error(codes::SYNTAX, span, headline, "nothing is open here").guess(
+        let headline = format!("`{}` has no opening bracket", char::from(bracket.byte));
+        self.found.push(Diagnostic::error(codes::SYNTAX, span, headline, "no open bracket before it").guess(
             "remove it",
             span,
             "",
@@ -319,7 +319,7 @@ impl Balance<'_> {
         let span = self.span(end, end);
         self.found.push(
             Diagnostic::error(codes::SYNTAX, span, format!("`{{` is missing after `{what}`"), "the block starts here")
-                .because(self.span(bracket.at, bracket.at + 1), "and ends here")
+                .because(self.span(bracket.at, bracket.at + 1), "the block ends here")
                 .guess("add `{`", span, " {"),
         );
     }
@@ -363,8 +363,8 @@ impl Balance<'_> {
         };
         let mut diagnostic = Diagnostic::error(codes::SYNTAX, span, headline, "`}` is missing for this `{`");
         if let Some(other) = other {
-            diagnostic = diagnostic
-                .because(self.span(other, other + 1), "this `}` stands further left: it closes an outer block");
+            diagnostic =
+                diagnostic.because(self.span(other, other + 1), "this `}` is further left: it closes an outer block");
         }
         self.found.push(diagnostic.guess("add `}`", self.span(end, end), "\n}"));
     }

@@ -20,7 +20,7 @@ pub fn decode(bytes: &[u8]) -> Result<String, NotText> {
     let offset = error.valid_up_to();
     let line = bytes[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
     let message = match bytes {
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "the file is UTF-16, not UTF-8; save it as UTF-8".to_owned(),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "the file is encoded in UTF-16; save it as UTF-8".to_owned(),
         _ => format!(
             "the file is not UTF-8 text: byte {:#04x} at offset {offset}; save it as UTF-8",
             bytes.get(offset).unwrap_or(&0)

@@ -161,7 +161,7 @@ const MISSING_VALUE: &str = "\u{1a}";
 fn reserved_character(file: FileId, text: &str) -> Option<Diagnostic> {
     let at = text.find(MISSING_VALUE)?;
     let span = Span::new(file, at, at + MISSING_VALUE.len());
-    Some(Diagnostic::error(codes::SYNTAX, span, "the file holds a character that is no text (U+001A)", "here"))
+    Some(Diagnostic::error(codes::SYNTAX, span, "the file contains a control character (U+001A)", "here"))
 }
 
 fn unreadable(span: Span) -> Diagnostic {
@@ -171,19 +171,19 @@ fn unreadable(span: Span) -> Diagnostic {
 fn missing_value(span: Span, word: &str) -> Diagnostic {
     let what = if word == "of" { "a species" } else { "a value" };
     Diagnostic::error(codes::SYNTAX, span, format!("{what} is missing after `{word}`"), "the line ends here")
-        .help("to go on in the next line, indent it")
+        .help("to continue on the next line, indent it")
 }
 
 fn too_large(span: Span, size: usize) -> Diagnostic {
-    let headline = format!("the file is too large: {:.1} MB", size as f64 / 1e6);
-    Diagnostic::error(codes::SYNTAX, span, headline, format!("at most {:.1} MB are read", MAX_SIZE as f64 / 1e6))
-        .help("split it into modules and join them with `use`")
+    let headline = format!("the file is too large ({:.1} MB)", size as f64 / 1e6);
+    Diagnostic::error(codes::SYNTAX, span, headline, format!("the limit is {:.1} MB", MAX_SIZE as f64 / 1e6))
+        .help("split it into modules and import them with `use`")
 }
 
 fn too_deep(span: Span) -> Diagnostic {
     let label = format!("more than {} brackets are open here", MAX_NESTING - 1);
     Diagnostic::error(codes::SYNTAX, span, "nested too deeply", label)
-        .help("give the inner parts names, as skills or with `let`")
+        .help("give the inner parts names with `let`, or move them into skills")
 }
 
 /// The findings in the order of the text, the first ones of very many.

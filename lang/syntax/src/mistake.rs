@@ -65,7 +65,7 @@ impl<'a> Mistakes<'a> {
             codes::SYNTAX,
             span,
             "the file does not start with `mtx 1`",
-            "the version of the language stands here",
+            "the version of the language belongs here",
         );
         let diagnostic = match super::scan::first_word(first) {
             "mtx" => diagnostic.help("write `mtx 1` alone on the first line"),

@@ -30,7 +30,7 @@ pub(crate) fn read<'a>(root: &Element<'a>, links: &HashMap<String, u32>) -> Resu
         mimic.expect_words(&[], &["joint", "multiplier", "offset"])?;
         let other = mimic.text("joint")?;
         let Some(&other_index) = index.get(other) else {
-            return Err(mimic.wrong(format!("joint `{}` follows `{other}`, which is no joint", joint.name)));
+            return Err(mimic.wrong(format!("joint `{}` follows `{other}`, which is not a joint", joint.name)));
         };
         if joints[other_index as usize].0.kind == JointKind::Fixed {
             return Err(mimic.wrong(format!("joint `{}` follows `{other}`, which does not move", joint.name)));
@@ -63,16 +63,16 @@ fn joint(element: &Element, links: &HashMap<String, u32>, unbounded: bool) -> Re
         "prismatic" => JointKind::Prismatic,
         other @ ("planar" | "floating" | "spherical") => {
             return Err(element.wrong(format!(
-                "joint `{name}` is `{other}`; write it as `prismatic` and `continuous` joints one after the other"
+                "joint `{name}` is `{other}`; write it as a chain of `prismatic` and `continuous` joints"
             )));
         }
-        other => return Err(element.wrong(format!("`{other}` is no type of joint"))),
+        other => return Err(element.wrong(format!("`{other}` is not a type of joint"))),
     };
     let end = |which: &str| -> Result<u32, Problem> {
         let end = element.needed(which)?;
         let link = end.text("link")?;
         let known = links.get(link).copied();
-        known.ok_or_else(|| end.wrong(format!("the {which} of joint `{name}` is `{link}`, which is no link")))
+        known.ok_or_else(|| end.wrong(format!("the {which} of joint `{name}` is `{link}`, which is not a link")))
     };
     let (parent, child) = (end("parent")?, end("child")?);
     if parent == child {
@@ -116,7 +116,7 @@ fn limits(element: &Element, name: &str, kind: JointKind, unbounded: bool) -> Re
     let positive = |attribute: &str| -> Result<Option<f64>, Problem> {
         match limit.optional(attribute)? {
             Some(value) if value <= 0.0 => {
-                Err(limit.wrong(format!("the greatest {attribute} of joint `{name}` is {value}, not above 0")))
+                Err(limit.wrong(format!("the maximum {attribute} of joint `{name}` is {value}, but must be above 0")))
             }
             value => Ok(value),
         }
@@ -146,7 +146,7 @@ fn limits(element: &Element, name: &str, kind: JointKind, unbounded: bool) -> Re
     }
     if limits.lower > limits.upper {
         let (lower, upper) = (limits.lower, limits.upper);
-        return Err(limit.wrong(format!("the limits of joint `{name}` leave no position: {lower} to {upper}")));
+        return Err(limit.wrong(format!("the limits of joint `{name}` allow no position: {lower} to {upper}")));
     }
     Ok(limits)
 }

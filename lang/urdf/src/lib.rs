@@ -50,7 +50,7 @@ pub fn read_with(text: &str, mut mesh: impl FnMut(&str) -> Option<Mesh>) -> Resu
     }
     if let Some(template) = document.root_element().descendants().find(is_template) {
         let what = template.tag_name().name();
-        return Err(Element(template).wrong(format!("`xacro:{what}` is to be expanded by xacro before this is URDF")));
+        return Err(Element(template).wrong(format!("`xacro:{what}` must be expanded by xacro first")));
     }
     root.expect_words(&["link", "joint", "material"], &["name", "version"])?;
 
@@ -59,7 +59,7 @@ pub fn read_with(text: &str, mut mesh: impl FnMut(&str) -> Option<Mesh>) -> Resu
     let mut index = HashMap::new();
     let elements: Vec<Element> = root.all("link").collect();
     if elements.len() > MOST_LINKS {
-        return Err(elements[MOST_LINKS].wrong(format!("there are more than {MOST_LINKS} links")));
+        return Err(elements[MOST_LINKS].wrong(format!("it has more than {MOST_LINKS} links")));
     }
     for element in &elements {
         let link = link(element, &colors)?;

@@ -75,7 +75,7 @@ pub(crate) fn pieces(element: &Element, colors: Option<&Colors>) -> Result<Vec<P
     let geometry = element.needed("geometry")?;
     let mut shapes = geometry.0.children().filter(Node::is_element).map(Element);
     let (Some(shape), None) = (shapes.next(), shapes.next()) else {
-        return Err(geometry.wrong("`geometry` is to have one shape"));
+        return Err(geometry.wrong("`geometry` must have one shape"));
     };
     let piece = |offset: f64, solid| Piece { placement: along_third(&placement, offset), solid, color };
     Ok(match shape.name() {
@@ -101,8 +101,9 @@ pub(crate) fn pieces(element: &Element, colors: Option<&Colors>) -> Result<Vec<P
             vec![piece(0.0, Solid::Mesh(shape.text("filename")?.to_string(), scale))]
         }
         other => {
-            return Err(shape
-                .wrong(format!("`{other}` is no shape; there are `box`, `cylinder`, `capsule`, `sphere` and `mesh`")));
+            return Err(
+                shape.wrong(format!("`{other}` is not a shape; use `box`, `cylinder`, `capsule`, `sphere` or `mesh`"))
+            );
         }
     })
 }

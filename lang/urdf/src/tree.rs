@@ -21,7 +21,7 @@ pub(crate) fn grow(
         if let Some(first) = carriers[joint.child as usize].replace(index) {
             let (child, first) = (&links[joint.child as usize].name, &joints[first].0.name);
             return Err(
-                element.wrong(format!("link `{child}` is carried by joint `{}` and by joint `{first}`", joint.name))
+                element.wrong(format!("link `{child}` is the child of joint `{}` and of joint `{first}`", joint.name))
             );
         }
         leaving[joint.parent as usize].push(index);
@@ -35,7 +35,7 @@ pub(crate) fn grow(
             return Err(at_link(root, elements, &second.name).wrong(message));
         }
         (None, _) if links.is_empty() => return Err(root.wrong("the robot has no link")),
-        (None, _) => return Err(root.wrong("every link is carried by a joint: they go round in a circle")),
+        (None, _) => return Err(root.wrong("every link is the child of a joint: they form a circle")),
     };
 
     let mut order = Vec::with_capacity(joints.len());
@@ -49,7 +49,7 @@ pub(crate) fn grow(
         order.iter().for_each(|&joint| reached[joint] = true);
         let lost = reached.iter().position(|r| !r).unwrap_or_default();
         let (joint, element) = &joints[lost];
-        let message = format!("joint `{}` is part of a circle that is not connected to the rest", joint.name);
+        let message = format!("joint `{}` is part of a separate circle", joint.name);
         return Err(element.wrong(message));
     }
 

@@ -39,13 +39,13 @@ impl<'a> Element<'a> {
         let mut all = self.all(name);
         match (all.next(), all.next()) {
             (first, None) => Ok(first),
-            (_, Some(second)) => Err(second.wrong(format!("{} has two elements `{name}`", self.title()))),
+            (_, Some(second)) => Err(second.wrong(format!("{} has two `{name}` elements", self.title()))),
         }
     }
 
     /// The element in it with this name.
     pub fn needed(&self, name: &str) -> Result<Element<'a>, Problem> {
-        self.one(name)?.ok_or_else(|| self.wrong(format!("{} has no element `{name}`", self.title())))
+        self.one(name)?.ok_or_else(|| self.wrong(format!("{} has no `{name}` element", self.title())))
     }
 
     /// An attribute as it is written.
@@ -118,7 +118,7 @@ impl<'a> Element<'a> {
     fn not_beyond(&self, attribute: &str, numbers: &[f64]) -> Result<(), Problem> {
         match numbers.iter().find(|n| n.abs() > LONGEST) {
             None => Ok(()),
-            Some(far) => Err(self.wrong(format!("{far:e} in `{attribute}` of {} is beyond 1000 km", self.title()))),
+            Some(far) => Err(self.wrong(format!("{far:e} in `{attribute}` of {} is more than 1000 km", self.title()))),
         }
     }
 
@@ -128,7 +128,7 @@ impl<'a> Element<'a> {
         self.not_beyond(attribute, &sizes)?;
         match sizes.iter().find(|&&size| size <= 0.0) {
             None => Ok(sizes),
-            Some(size) => Err(self.wrong(format!("`{attribute}` of {} is {size}, not above 0", self.title()))),
+            Some(size) => Err(self.wrong(format!("`{attribute}` of {} is {size}, but must be above 0", self.title()))),
         }
     }
 
@@ -137,14 +137,16 @@ impl<'a> Element<'a> {
         for child in self.0.children().filter(Node::is_element) {
             if let Some(meant) = meant(child.tag_name().name(), elements) {
                 let name = child.tag_name().name();
-                return Err(Element(child).wrong(format!("`{name}` is no element of the format; is `{meant}` meant?")));
+                return Err(
+                    Element(child).wrong(format!("`{name}` is not an element of URDF; did you mean `{meant}`?"))
+                );
             }
         }
         for attribute in self.0.attributes() {
             if let Some(meant) = meant(attribute.name(), attributes) {
                 let name = attribute.name();
                 let title = self.title();
-                return Err(self.wrong(format!("`{name}` is no attribute of {title}; is `{meant}` meant?")));
+                return Err(self.wrong(format!("`{name}` is not an attribute of {title}; did you mean `{meant}`?")));
             }
         }
         Ok(())

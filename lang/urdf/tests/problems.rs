@@ -52,15 +52,23 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     ("<robot name", "<robt name", "line 20: expected `robt` tag, not `robot`"),
     ("\"base\"/>\n  <link name=\"arm\"", "\"arm\"/>\n  <link name=\"arm\"", "line 3: link `arm` is described twice"),
     ("name=\"slide\"", "name=\"turn\"", "line 15: joint `turn` is described twice"),
-    ("<link name=\"hand\"/>", "", "line 16: the child of joint `slide` is `hand`, which is no link"),
-    ("<child link=\"arm\"/>", "<child link=\"hand\"/>", "link `hand` is carried by joint `slide` and by joint `turn`"),
+    ("<link name=\"hand\"/>", "", "line 16: the child of joint `slide` is `hand`, which is not a link"),
+    (
+        "<child link=\"arm\"/>",
+        "<child link=\"hand\"/>",
+        "link `hand` is the child of joint `slide` and of joint `turn`",
+    ),
     ("<parent link=\"base\"/>", "<parent link=\"arm\"/>", "line 9: joint `turn` connects a link with itself"),
     ("<axis xyz=\"0 0 2\"/>", "<axis xyz=\"0 0 0\"/>", "line 11: the axis of joint `turn` has length 0"),
     ("<axis xyz=\"0 0 2\"/>", "<axis xyz=\"0 0 NaN\"/>", "line 11: `NaN` in `xyz` of `axis` is not a finite number"),
     ("<axis xyz=\"0 0 2\"/>", "<axis xyz=\"0 0\"/>", "line 11: `xyz` of `axis` has 2 of 3 numbers"),
-    ("<axis xyz=\"0 0 2\"/>", "<axsi xyz=\"0 0 2\"/>", "line 11: `axsi` is no element of the format; is `axis` meant?"),
+    (
+        "<axis xyz=\"0 0 2\"/>",
+        "<axsi xyz=\"0 0 2\"/>",
+        "line 11: `axsi` is not an element of URDF; did you mean `axis`?",
+    ),
     ("lower=\"-1\" upper=\"1\"", "", "line 12: `limit` of joint `turn` has no `lower` and `upper`"),
-    ("lower=\"-1\" upper=\"1\"", "lower=\"2\" upper=\"1\"", "leave no position: 2 to 1"),
+    ("lower=\"-1\" upper=\"1\"", "lower=\"2\" upper=\"1\"", "allow no position: 2 to 1"),
     ("lower=\"-1\"", "lower=\"-inf\"", "line 12: `-inf` in `lower` of `limit` is not a finite number"),
     (
         "velocity=\"2\" effort=\"3\"/>\n    <safety",
@@ -69,20 +77,20 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     ),
     ("velocity=\"2\" effort=\"3\"/>\n    <safety", "velocity=\"0\" effort=\"3\"/>\n    <safety", "is 0, not above 0"),
     ("<limit upper=\"1\" velocity=\"2\" effort=\"3\"/>", "", "line 15: joint `slide` has no `limit`"),
-    ("<mimic joint=\"turn\"", "<mimic joint=\"trun\"", "line 18: joint `slide` follows `trun`, which is no joint"),
+    ("<mimic joint=\"turn\"", "<mimic joint=\"trun\"", "line 18: joint `slide` follows `trun`, which is not a joint"),
     ("<mimic joint=\"turn\"", "<mimic joint=\"slide\"", "line 15: joint `slide` follows itself"),
     ("type=\"prismatic\"", "type=\"planar\"", "line 15: joint `slide` is `planar`"),
-    ("type=\"prismatic\"", "type=\"round\"", "line 15: `round` is no type of joint"),
-    ("<box size=\"1 1 1\"/>", "<cone size=\"1 1 1\"/>", "line 5: `cone` is no shape"),
-    ("<box size=\"1 1 1\"/>", "<box size=\"1 0 1\"/>", "line 5: `size` of `box` is 0, not above 0"),
-    ("<box size=\"1 1 1\"/>", "", "line 5: `geometry` is to have one shape"),
+    ("type=\"prismatic\"", "type=\"round\"", "line 15: `round` is not a type of joint"),
+    ("<box size=\"1 1 1\"/>", "<cone size=\"1 1 1\"/>", "line 5: `cone` is not a shape"),
+    ("<box size=\"1 1 1\"/>", "<box size=\"1 0 1\"/>", "line 5: `size` of `box` is 0, but must be above 0"),
+    ("<box size=\"1 1 1\"/>", "", "line 5: `geometry` must have one shape"),
     ("rgba=\"1 0 0 1\"", "rgba=\"255 0 0 1\"", "line 5: 255 in `rgba` is not between 0 and 1"),
     ("<mass value=\"1\"/>", "<mass value=\"-1\"/>", "line 4: `value` of `mass` is -1, below 0"),
     ("<mass value=\"1\"/>", "<mass value=\"${m}\"/>", "line 4: `${m}` in `value` of `mass` is not a finite number"),
     (
         "<robot name=\"two\">",
         "<robot xmlns:xacro=\"http://x/xacro\"><xacro:include/>",
-        "`xacro:include` is to be expanded",
+        "`xacro:include` must be expanded",
     ),
     (
         "  <link name=\"hand\"/>",
@@ -109,10 +117,10 @@ fn circles_are_found() {
     let links = "<link name='a'/><link name='b'/><link name='c'/>";
     let all = [joint("j", "a", "b"), joint("k", "b", "c"), joint("l", "c", "a")].concat();
     let problem = read(&format!("<robot>{links}{all}</robot>")).expect_err("a circle");
-    assert!(problem.message.contains("round in a circle"), "{problem}");
+    assert!(problem.message.contains("they form a circle"), "{problem}");
     let some = [joint("k", "b", "c"), joint("l", "c", "b")].concat();
     let problem = read(&format!("<robot>{links}{some}</robot>")).expect_err("a circle");
-    assert!(problem.message.contains("`k` is part of a circle"), "{problem}");
+    assert!(problem.message.contains("`k` is part of a separate circle"), "{problem}");
 }
 
 #[test]

@@ -63,7 +63,7 @@ impl Server {
     pub fn answer(&mut self, client: Client, answer: Answer) {
         let is_full = self.listeners() >= self.limits.listeners;
         let answer = match answer.body {
-            None if is_full => Answer::text(503, "too many listen already"),
+            None if is_full => Answer::text(503, "too many clients are listening"),
             _ => answer,
         };
         if let Some(connection) = self.find(client).filter(|c| c.is_asked()) {

@@ -44,7 +44,7 @@ pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<D
         Ok(table) => table,
         Err(e) => {
             let at = e.span().map_or(0..0, |s| s);
-            reader.wrong(at, "the file is not TOML", e.message().to_owned(), None);
+            reader.wrong(at, "this file is not valid TOML", e.message().to_owned(), None);
             return (Vec::new(), reader.found);
         }
     };
@@ -120,22 +120,27 @@ impl Reader<'_> {
             let lab = &self.program.scene.lab;
             let top =
                 self.program.scene.instances.iter().filter(|i| i.owner.is_none()).map(|i| format!("`{}`", i.name));
-            let help = format!("it has {}", top.take(12).collect::<Vec<_>>().join(", "));
+            let help = format!("use one of {}", top.take(12).collect::<Vec<_>>().join(", "));
             self.wrong(name.span(), &format!("the lab `{lab}` has no `{key}`"), "no such device", Some(help));
             return None;
         };
         let DeValue::Table(table) = value.get_ref() else {
             self.wrong(
                 value.span(),
-                &format!("`{key}` is bound with a table"),
-                "no table",
-                Some(format!("write `[{key}]`, then a key a line")),
+                &format!("`{key}` needs a table"),
+                "not a table",
+                Some(format!("write `[{key}]`, then one key on each line")),
             );
             return None;
         };
         for (k, _) in table.iter().filter(|(k, _)| !KEYS.contains(&k.get_ref().as_ref())) {
-            let help = format!("a binding has {}", KEYS.map(|k| format!("`{k}`")).join(", "));
-            self.wrong(k.span(), &format!("a binding has no `{}`", k.get_ref()), "not a known key", Some(help));
+            let help = format!("use {}", KEYS.map(|k| format!("`{k}`")).join(", "));
+            self.wrong(
+                k.span(),
+                &format!("unknown key `{}` in a binding", k.get_ref()),
+                "not a key of a binding",
+                Some(help),
+            );
         }
         let before = self.found.len();
         if let Some((_, value)) = table.iter().find(|(k, _)| k.get_ref() == CALIBRATION) {
@@ -165,14 +170,14 @@ impl Reader<'_> {
         let place = match place.checked() {
             Ok(place) => place,
             Err(no) => {
-                self.wrong(at, &format!("`{key}` cannot be there: {}", no.why), "no place", Some(no.help));
+                self.wrong(at, &format!("the place of `{key}` is invalid: {}", no.why), "invalid place", Some(no.help));
                 return None;
             }
         };
         if let Some((unit, at)) = &unit
             && let Err(why) = crate::codec::Codec::new(&self.program.drivers[driver].framing, Some(unit))
         {
-            self.wrong(at.clone(), &why, "not an address on this line", None);
+            self.wrong(at.clone(), &why, "not an address of this line", None);
         }
         let tolerances = self.tolerances(key, driver, table);
         let identity = self.identity(key, driver, table);
@@ -221,11 +226,11 @@ impl Reader<'_> {
             let (name, first) =
                 (&self.program.scene.get(binding.instance).name, &self.program.scene.get(other.instance).name);
             let (why, help) = if address.is_none() || known.is_none() {
-                ("their framing has no address", "bind each to a line of its own, or use a framing with an `{address}`")
+                ("their framing has no address", "bind each to its own line, or use a framing with an `{address}`")
             } else if address == known {
                 ("both have the same address", "give each its own: `unit = \"2\"`")
             } else if own.transport != theirs.transport || own.framing != theirs.framing {
-                ("their drivers speak in other ways", "use drivers with the same transport and framing")
+                ("their drivers use different protocols", "use drivers with the same transport and framing")
             } else {
                 continue;
             };
@@ -254,8 +259,8 @@ impl Reader<'_> {
         if let DeValue::String(text) = value.get_ref() {
             return Some((text.to_string(), value.span()));
         }
-        let headline = format!("`{wanted}` is a text");
-        self.wrong(value.span(), &headline, "no text", Some("write it in quotes".into()));
+        let headline = format!("`{wanted}` must be a text");
+        self.wrong(value.span(), &headline, "not a text", Some("write it in quotes".into()));
         None
     }
 
@@ -263,11 +268,11 @@ impl Reader<'_> {
     fn by_hand(&mut self, key: &str, by: &str, at: Range, names_a_line: bool) {
         if by != HAND {
             let help = "write `by = \"hand\"`";
-            self.wrong(at.clone(), "only a person's hands need no line", "not understood", Some(help.into()));
+            self.wrong(at.clone(), "the only value of `by` is `hand`", "another value", Some(help.into()));
         }
         if names_a_line {
-            let headline = format!("`{key}` is done by hand and bound to a line");
-            self.wrong(at, &headline, "one or the other", None);
+            let headline = format!("`{key}` is bound both to a person and to a line");
+            self.wrong(at, &headline, "choose one of them", None);
         }
     }
 
@@ -277,14 +282,14 @@ impl Reader<'_> {
         match (places.next(), places.next()) {
             (Some(place), None) => Some(place),
             (_, Some((_, at))) => {
-                let label = "only one of `port`, `address`, `http` and `sila`";
+                let label = "use only one of `port`, `address`, `http` and `sila`";
                 self.wrong(at, &format!("`{key}` has two lines"), label, None);
                 None
             }
             (None, None) => {
                 let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `http = \"HOST:PORT\"`, \
                             `sila = \"HOST:PORT\"` or `by = \"hand\"`";
-                self.wrong(name, &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
+                self.wrong(name, &format!("the binding of `{key}` has no place"), "no place", Some(help.into()));
                 None
             }
         }
@@ -295,9 +300,9 @@ impl Reader<'_> {
         let (identity, at) = self.text(table, IDENTITY)?;
         let driver = &self.program.drivers[driver];
         if driver.identity.is_empty() {
-            let headline = format!("`{}` cannot ask `{key}` who it is", driver.name);
+            let headline = format!("the driver `{}` cannot ask `{key}` for its identity", driver.name);
             let help = "add its line `identity sends \"...\" expects \"... {<serial>}\"`";
-            self.wrong(at, &headline, "never asked", Some(help.to_owned()));
+            self.wrong(at, &headline, "cannot be checked", Some(help.to_owned()));
             return None;
         }
         Some(identity)
@@ -317,11 +322,13 @@ impl Reader<'_> {
         }
         let (headline, help) = match transport {
             Transport::Sila { .. } => {
-                (format!("`{name}` speaks to a server of SiLA 2"), format!("write `sila = \"{place}\"`"))
+                (format!("the driver `{name}` needs a SiLA 2 server"), format!("write `sila = \"{place}\"`"))
             }
-            Transport::Http { .. } => (format!("`{name}` speaks over HTTP"), format!("write `http = \"{place}\"`")),
+            Transport::Http { .. } => {
+                (format!("the driver `{name}` needs HTTP"), format!("write `http = \"{place}\"`"))
+            }
             _ => (
-                format!("`{name}` speaks over a line"),
+                format!("the driver `{name}` needs a serial line or a network address"),
                 "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`".to_owned(),
             ),
         };
@@ -353,12 +360,12 @@ impl Reader<'_> {
             (None, []) => {
                 let help =
                     "declare one: `driver NAME for ASSET over serial(...) { }`, or let a person do it: `by = \"hand\"`";
-                self.wrong(at, &format!("no driver says how `{key}` is spoken to"), "no driver", Some(help.into()));
+                self.wrong(at, &format!("`{key}` has no driver"), "a driver is missing", Some(help.into()));
                 None
             }
             (None, _) => {
-                let help = format!("say which: `driver = ...` with one of {list}");
-                self.wrong(at, &format!("`{key}` has several drivers"), "which one?", Some(help));
+                let help = format!("choose one: `driver = ...` with one of {list}");
+                self.wrong(at, &format!("`{key}` has several drivers"), "ambiguous", Some(help));
                 None
             }
         }
@@ -405,11 +412,11 @@ impl Reader<'_> {
     fn calibration(&mut self, value: &Spanned<DeValue<'_>>) {
         let help = || Some("write `calibration = { offset_x = \"0.1 mm\" }`".to_owned());
         let DeValue::Table(all) = value.get_ref() else {
-            self.wrong(value.span(), "a calibration is a table", "no table", help());
+            self.wrong(value.span(), "a calibration must be a table", "not a table", help());
             return;
         };
         for (_, value) in all.iter().filter(|(_, v)| !matches!(v.get_ref(), DeValue::String(_))) {
-            self.wrong(value.span(), "what was measured is a text with its unit", "no text", help());
+            self.wrong(value.span(), "a measured value must be a text with its unit", "not a text", help());
         }
     }
 
@@ -418,7 +425,7 @@ impl Reader<'_> {
         let Some((_, value)) = table.iter().find(|(k, _)| k.get_ref() == "tolerance") else { return Vec::new() };
         let DeValue::Table(all) = value.get_ref() else {
             let help = "write `tolerance = { temperature = \"5 K\" }`";
-            self.wrong(value.span(), "tolerances are a table", "no table", Some(help.into()));
+            self.wrong(value.span(), "tolerances must be a table", "not a table", Some(help.into()));
             return Vec::new();
         };
         let mut out = Vec::new();
@@ -428,11 +435,11 @@ impl Reader<'_> {
             let Some(told) = told else {
                 let names: Vec<String> =
                     program.drivers[driver].told.iter().map(|t| format!("`{}`", &t.name[key.len() + 1..])).collect();
-                let help = format!("it tells {}", names.join(", "));
+                let help = format!("it reports {}", names.join(", "));
                 self.wrong(
                     member.span(),
-                    &format!("`{key}` does not tell `{}`", member.get_ref()),
-                    "not told",
+                    &format!("`{key}` does not report `{}`", member.get_ref()),
+                    "not reported",
                     Some(help),
                 );
                 continue;
@@ -447,8 +454,9 @@ impl Reader<'_> {
                 Some(number) => out.push((member.get_ref().to_string(), number * unit.factor)),
                 None => {
                     let help = format!("write it as in `{} = \"2 {}\"`", member.get_ref(), unit.symbol);
-                    let headline = format!("the tolerance of `{}` is a number of {}", member.get_ref(), unit.symbol);
-                    self.wrong(value.span(), &headline, "not one", Some(help));
+                    let headline =
+                        format!("the tolerance of `{}` must be a number in {}", member.get_ref(), unit.symbol);
+                    self.wrong(value.span(), &headline, "not such a number", Some(help));
                 }
             }
         }

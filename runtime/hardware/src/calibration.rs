@@ -47,7 +47,7 @@ pub fn read(text: &str) -> Vec<Calibrated> {
 pub fn unconfirmed(file: FileId, text: &str) -> Vec<Diagnostic> {
     let wrong = |c: Calibrated| {
         let span = Span::new(file, c.field.1.start, c.value.end);
-        let headline = "nobody is asked here whether what was measured is still so";
+        let headline = "this command does not ask anyone to confirm the calibration";
         Diagnostic::error(codes::BINDING, span, headline, "not confirmed").help("`matterixc deploy` asks")
     };
     read(text).into_iter().map(wrong).collect()

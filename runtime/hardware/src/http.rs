@@ -34,10 +34,10 @@ struct Asks {
 /// Opens a line to the server at `HOST:PORT`.
 pub fn open(address: &str, driver: &Driver) -> io::Result<Http> {
     let Transport::Http { header } = &driver.transport else {
-        return Err(io::Error::new(ErrorKind::InvalidInput, "the driver does not speak over HTTP"));
+        return Err(io::Error::new(ErrorKind::InvalidInput, "the driver does not use HTTP"));
     };
     let timeout = Duration::try_from_secs_f64(driver.timeout);
-    let timeout = timeout.map_err(|_| io::Error::new(ErrorKind::InvalidInput, "the timeout is no duration"))?;
+    let timeout = timeout.map_err(|_| io::Error::new(ErrorKind::InvalidInput, "the timeout is not a duration"))?;
     // Whether somebody is there is known before anything is asked.
     drop(port::connect(address)?);
     let config = Agent::config_builder().http_status_as_error(false).max_redirects(0).proxy(None);
@@ -71,7 +71,7 @@ impl Asks {
 }
 
 fn unclear(line: &str) -> io::Error {
-    io::Error::new(ErrorKind::InvalidInput, format!("`{}` is no request", line.trim_end()))
+    io::Error::new(ErrorKind::InvalidInput, format!("`{}` is not a request", line.trim_end()))
 }
 
 fn broken(e: ureq::Error) -> io::Error {
@@ -139,7 +139,7 @@ impl Port for Http {
         };
         match pending.recv_timeout(within) {
             Err(RecvTimeoutError::Timeout) => Ok(Vec::new()),
-            Err(RecvTimeoutError::Disconnected) => Err(io::Error::other("the request came to nothing")),
+            Err(RecvTimeoutError::Disconnected) => Err(io::Error::other("the request failed")),
             Ok(answer) => {
                 self.pending = None;
                 match answer {

@@ -136,7 +136,7 @@ pub trait Line {
     /// The newest of what the device says by itself, SI, by its line of the driver; one that is older than the driver waits for
     /// an answer is none, or that came before what was done last, and the next is waited for as long.
     fn hear(&mut self, _line: usize, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
-        Err(DeviceError::Lost("nothing is heard over this line".to_owned()))
+        Err(DeviceError::Lost("this line receives nothing".to_owned()))
     }
 
     /// Takes in what the device has said by itself: what waits on a line is as old as nobody looked.
@@ -226,7 +226,7 @@ fn sila(
 
 #[cfg(not(feature = "sila"))]
 fn sila(server: &SilaServer, _: &str, _: Option<&str>, _: f64) -> Result<Box<dyn Line>, DeviceError> {
-    let why = "this build does not speak SiLA 2: build it with `--features sila`";
+    let why = "this build has no SiLA 2: build it with `--features sila`";
     Err(DeviceError::Lost(format!("cannot connect to `{}`: {why}", server.at)))
 }
 
@@ -271,7 +271,7 @@ impl Link {
     ) -> Result<Self, String> {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
-            Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
+            Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is not a duration".to_owned())?;
         let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
         let (debt, asked, is_again) = (port.debt(), (String::new(), Duration::ZERO), false);
         let (done, emptied, gone) = (Duration::ZERO, Duration::ZERO, None);
@@ -322,9 +322,9 @@ impl Link {
                     return Ok(());
                 }
                 let (n, seconds) = (self.owed(), silence.as_secs_f64());
-                let what = if n == 1 { "an answer".to_owned() } else { format!("{n} answers") };
+                let what = if n == 1 { "a reply".to_owned() } else { format!("{n} replies") };
                 return Err(DeviceError::Garbled(format!(
-                    "it owes {what} to `{}`, and nothing else is said to it before its line was silent for {} s",
+                    "it still owes {what} to `{}`: nothing else is sent before its line is silent for {} s",
                     self.debt.asked(),
                     show_number(seconds)
                 )));
@@ -375,9 +375,8 @@ impl Link {
                 }
                 self.debt.heard(self.world.elapsed());
                 self.sift(driver);
-                return reply.map_err(|g| {
-                    DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
-                });
+                return reply
+                    .map_err(|g| DeviceError::Garbled(format!("its reply to `{}` is invalid: {}", shown(to), g.why)));
             }
             if let Some(patience) = ear.patience().filter(|_| !hurried) {
                 hurried = true;
@@ -388,9 +387,9 @@ impl Link {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 self.debt.owes(&self.asked.0, self.asked.1);
                 return Err(match self.buffer.as_slice() {
-                    [] => DeviceError::Silent(format!("it did not answer `{}` within {seconds} s", shown(to))),
+                    [] => DeviceError::Silent(format!("it did not reply to `{}` within {seconds} s", shown(to))),
                     half => DeviceError::Garbled(format!(
-                        "its answer to `{}` broke off after `{}`: nothing more came within {seconds} s",
+                        "its reply to `{}` stopped after `{}`: nothing more came within {seconds} s",
                         shown(to),
                         shown(half)
                     )),
@@ -417,7 +416,7 @@ impl Link {
         if let Some(why) = self.gone.take() {
             return Err(why);
         }
-        let bytes = self.port.receive(within).map_err(|e| format!("the line is gone: {e}"))?;
+        let bytes = self.port.receive(within).map_err(|e| format!("the line was lost: {e}"))?;
         if bytes.is_empty() {
             self.emptied = self.world.elapsed();
             return Ok(false);
@@ -454,9 +453,8 @@ impl Link {
                 heard = self.world.elapsed();
             }
             while let Some(later) = self.codec.take_reply(&mut self.buffer) {
-                let later = later.map_err(|g| {
-                    DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
-                })?;
+                let later = later
+                    .map_err(|g| DeviceError::Garbled(format!("its reply to `{}` is invalid: {}", shown(to), g.why)))?;
                 if !self.overheard(&later, driver) {
                     self.debt.heard(self.world.elapsed());
                     self.debt.paid();
@@ -507,7 +505,7 @@ impl Link {
         let said = self.codec.said(pattern, &reply.text).ok_or_else(|| {
             let (to, expected) = (shown(frame), written(pattern));
             let is = self.codec.shown_reply(None, &reply.text);
-            DeviceError::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
+            DeviceError::Garbled(format!("it replied `{is}` to `{to}`, not `{expected}`"))
         })?;
         self.note_texts(said.kept, ear);
         Ok(said.numbers)
@@ -540,7 +538,7 @@ impl Link {
     /// The failure that an answer means.
     fn refusal(&mut self, driver: &Driver, reply: &Reply) -> Option<DeviceError> {
         let named = driver.refusals.iter().find(|r| self.codec.matched(&r.reply, &reply.text).is_some());
-        let text = format!("it answered `{}`", self.codec.shown_reply(named.map(|n| &n.reply), &reply.text));
+        let text = format!("it replied `{}`", self.codec.shown_reply(named.map(|n| &n.reply), &reply.text));
         match named {
             Some(named) => Some(DeviceError::Refused { failure: named.failure.clone(), text }),
             None if reply.is_error => Some(DeviceError::Refused { failure: "refused".to_owned(), text }),
@@ -587,7 +585,7 @@ impl Line for Link {
         let found = told.forms().find_map(|(form, shows)| Some((codec.said(form, &reply.text)?, form, shows)));
         let Some((said, form, shows)) = found else {
             let (to, is) = (shown(&frame), self.codec.shown_reply(None, &reply.text));
-            return Err(DeviceError::Garbled(format!("to `{to}` it answered `{is}`, not `{}`", forms(told))));
+            return Err(DeviceError::Garbled(format!("it replied `{is}` to `{to}`, not `{}`", forms(told))));
         };
         self.note_texts(said.kept, ear);
         showable(told, &said.numbers, form, shows)
@@ -647,7 +645,7 @@ impl Line for Link {
             let left = most.saturating_sub(self.passed(begun));
             if left.is_zero() {
                 let wanted = driver.told.get(line).map(|told| written(&told.expects)).unwrap_or_default();
-                let why = format!("it did not say anything like `{wanted}` for {} s", self.timeout.as_secs_f64());
+                let why = format!("it sent nothing like `{wanted}` for {} s", self.timeout.as_secs_f64());
                 return Err(DeviceError::Silent(why));
             }
             self.listen(left.min(LOOK), ear)?;
@@ -717,7 +715,7 @@ pub(crate) fn showable(
     form: &Pattern,
     shows: Option<[f64; 2]>,
 ) -> Result<f64, DeviceError> {
-    let value = *numbers.first().ok_or_else(|| DeviceError::Garbled("no number was told".to_owned()))?;
+    let value = *numbers.first().ok_or_else(|| DeviceError::Garbled("the reply has no number".to_owned()))?;
     let Some([least, most]) = shows.filter(|[least, most]| !(*least..=*most).contains(&value)) else {
         return Ok(value);
     };
@@ -735,5 +733,5 @@ pub(crate) fn showable(
     if range.contains(&is) {
         is = format!("{} {}", plain(unit.of_si(value)), unit.symbol);
     }
-    Err(DeviceError::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, is.trim())))
+    Err(DeviceError::Garbled(format!("its reply gives `{}` as {}, but its range is {range}", told.name, is.trim())))
 }

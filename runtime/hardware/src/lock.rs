@@ -64,7 +64,7 @@ fn busy(file: &mut File) -> io::Error {
     let read = file.take(LONGEST).read_to_string(&mut who);
     let who = who.trim();
     let who = if read.is_err() || who.is_empty() { "another process" } else { who };
-    io::Error::new(ErrorKind::ResourceBusy, format!("{who} is using it"))
+    io::Error::new(ErrorKind::ResourceBusy, format!("{who} uses it"))
 }
 
 /// The same texts for the same port, however it is written: one for each address that a name stands for.
@@ -111,7 +111,7 @@ fn is_own(path: &Path, user: u32) -> io::Result<()> {
     if about.is_dir() && about.uid() == user && about.mode() & 0o022 == 0 {
         return Ok(());
     }
-    Err(io::Error::other(format!("`{}` is not a folder of this user's own, and locks belong there", path.display())))
+    Err(io::Error::other(format!("`{}` must be a folder of this user, because it holds the locks", path.display())))
 }
 
 #[cfg(test)]

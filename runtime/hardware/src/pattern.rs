@@ -117,7 +117,7 @@ fn number(unit: &Unit, form: &Form, shown: Shown) -> Result<String, String> {
     let number = unit.of_si(shown.value);
     match shown.digits {
         Some(digits) if *form == Form::default() => Ok(crate::template::fixed(number, digits)),
-        _ => form.write(number).map_err(|why| format!("{} cannot be told: {why}", unit.show(shown.value))),
+        _ => form.write(number).map_err(|why| format!("{} cannot be sent: {why}", unit.show(shown.value))),
     }
 }
 

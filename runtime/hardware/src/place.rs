@@ -118,12 +118,12 @@ impl Place {
 fn serial(path: &str) -> Result<(), NoPlace> {
     let as_path = || "write the path of the port, as in `port = \"/dev/ttyUSB0\"`".to_owned();
     if path.trim().is_empty() {
-        return Err(NoPlace { why: "a serial port has a path".to_owned(), help: as_path() });
+        return Err(NoPlace { why: "a serial port needs a path".to_owned(), help: as_path() });
     }
     match path.split_once("://") {
         Some((scheme, _)) => Err(NoPlace {
-            why: format!("a serial port is a path, and `{scheme}://` begins none"),
-            help: "what is reached over a network has `address = \"HOST:PORT\"`".to_owned(),
+            why: format!("a serial port needs a path, but `{scheme}://` is not one"),
+            help: "for a device on the network write `address = \"HOST:PORT\"`".to_owned(),
         }),
         None => Ok(()),
     }
@@ -135,20 +135,17 @@ fn endpoint(text: &str, key: &str) -> Result<(), NoPlace> {
     let form = || format!("write `{key} = \"HOST:PORT\"`");
     if let Some((scheme, rest)) = text.split_once("://") {
         let rest = rest.split('/').next().unwrap_or_default();
-        return wrong(format!("`{scheme}://` is not spoken here"), format!("write `{key} = \"{rest}\"`"));
+        return wrong(format!("`{scheme}://` is not supported here"), format!("write `{key} = \"{rest}\"`"));
     }
     let (host, port) = match text.strip_prefix('[').and_then(|t| t.split_once(']')) {
         Some((host, rest)) => (host, rest.strip_prefix(':')),
         None => text.rsplit_once(':').map_or((text, None), |(host, port)| (host, Some(port))),
     };
     if text.parse::<Ipv6Addr>().is_ok() || (host.contains(':') && !text.starts_with('[')) {
-        return wrong(
-            "an address of IPv6 stands in brackets".to_owned(),
-            format!("write `{key} = \"[ADDRESS]:PORT\"`"),
-        );
+        return wrong("an IPv6 address needs brackets".to_owned(), format!("write `{key} = \"[ADDRESS]:PORT\"`"));
     }
     if host.is_empty() {
-        return wrong("no host is named".to_owned(), form());
+        return wrong("the host is missing".to_owned(), form());
     }
     let is_number = host.bytes().all(|b| b.is_ascii_digit() || b == b'.');
     let named = |b: u8| b.is_ascii_alphanumeric() || b"-._".contains(&b);
@@ -158,7 +155,7 @@ fn endpoint(text: &str, key: &str) -> Result<(), NoPlace> {
         false => host.bytes().all(named) || !host.is_ascii() && !host.contains(char::is_whitespace),
     };
     if !known {
-        return wrong(format!("`{host}` is neither the name nor the number of a host"), form());
+        return wrong(format!("`{host}` is not a host name or address"), form());
     }
     let Some(port) = port.filter(|port| !port.is_empty()) else {
         let bare = text.trim_end_matches(':');
@@ -167,27 +164,29 @@ fn endpoint(text: &str, key: &str) -> Result<(), NoPlace> {
     let is_port = port.bytes().all(|b| b.is_ascii_digit());
     match port.parse::<u16>().ok().filter(|n| is_port && *n > 0) {
         Some(_) => Ok(()),
-        None => wrong(format!("`{port}` is no port, which is a number from 1 to 65535"), form()),
+        None => wrong(format!("`{port}` is not a port: a number from 1 to 65535"), form()),
     }
 }
 
 /// What is at a place that could not be opened, in words.
 pub fn trouble(place: &Place, error: &io::Error) -> String {
     match (error.kind(), place) {
-        (ErrorKind::ConnectionRefused, _) => format!("nothing listens at `{place}`: the connection was refused"),
-        (ErrorKind::TimedOut, _) => format!("nobody answers at `{place}`: it timed out"),
-        (ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable, _) => format!("no way leads to `{place}`"),
-        (ErrorKind::NotFound, Place::Serial(text)) if text.contains(':') && !text.starts_with('/') => {
-            format!("there is no port `{place}`: a host with its port is an `address`")
+        (ErrorKind::ConnectionRefused, _) => format!("`{place}` refused the connection: no program listens there"),
+        (ErrorKind::TimedOut, _) => format!("`{place}` does not answer: the connection timed out"),
+        (ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable, _) => {
+            format!("the network has no route to `{place}`")
         }
-        (ErrorKind::NotFound, Place::Serial(_)) => format!("there is no port `{place}`"),
+        (ErrorKind::NotFound, Place::Serial(text)) if text.contains(':') && !text.starts_with('/') => {
+            format!("the port `{place}` does not exist: for a host with its port write `address`")
+        }
+        (ErrorKind::NotFound, Place::Serial(_)) => format!("the port `{place}` does not exist"),
         (ErrorKind::PermissionDenied, Place::Serial(_)) => {
-            format!("the port `{place}` may not be opened by this user")
+            format!("this user may not open the port `{place}`")
         }
         (ErrorKind::ResourceBusy, Place::Serial(_)) if error.raw_os_error().is_some() => {
-            format!("another program has the port `{place}`")
+            format!("another program uses the port `{place}`")
         }
-        (ErrorKind::ResourceBusy, _) => format!("`{place}` is taken: {}", plain(error)),
+        (ErrorKind::ResourceBusy, _) => format!("`{place}` is in use: {}", plain(error)),
         // An error that says what it is needs no second saying.
         _ => format!("`{place}` cannot be opened: {}", plain(error)),
     }
@@ -237,18 +236,18 @@ mod tests {
         let cases = [
             ("nonsense", "the port of `nonsense` is missing"),
             ("robot:", "the port of `robot` is missing"),
-            ("robot:0", "`0` is no port"),
-            ("robot:65536", "`65536` is no port"),
-            ("robot:+7", "`+7` is no port"),
-            ("robot:http", "`http` is no port"),
-            (":31950", "no host"),
-            ("", "no host"),
-            ("300.1.1.1:80", "neither the name nor the number"),
-            ("a robot:80", "neither the name nor the number"),
+            ("robot:0", "`0` is not a port"),
+            ("robot:65536", "`65536` is not a port"),
+            ("robot:+7", "`+7` is not a port"),
+            ("robot:http", "`http` is not a port"),
+            (":31950", "the host is missing"),
+            ("", "the host is missing"),
+            ("300.1.1.1:80", "is not a host name or address"),
+            ("a robot:80", "is not a host name or address"),
             ("::1", "in brackets"),
-            ("[robot]:80", "neither the name nor the number"),
-            ("https://robot:80", "`https://` is not spoken here"),
-            ("robot:80/runs", "`80/runs` is no port"),
+            ("[robot]:80", "is not a host name or address"),
+            ("https://robot:80", "`https://` is not supported here"),
+            ("robot:80/runs", "`80/runs` is not a port"),
         ];
         for (text, wanted) in cases {
             let why = Place::Http(text.to_owned()).checked().expect_err(text).why;

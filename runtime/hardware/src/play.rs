@@ -155,7 +155,7 @@ impl Player<'_> {
             let begun = Instant::now();
             while !self.link.is_ready(&question, until, self.driver, ear)? {
                 if begun.elapsed() > SECURED {
-                    return said.and(Err(DeviceError::Silent("it did not tell in time that it was safe".to_owned())));
+                    return said.and(Err(DeviceError::Silent("it did not report in time that it is safe".to_owned())));
                 }
                 std::thread::sleep(POLL);
             }

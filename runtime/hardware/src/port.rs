@@ -29,7 +29,7 @@ pub trait Port {
     }
     /// Has a file ready that a message may say is to go with it.
     fn attach(&mut self, _name: &str, _bytes: Vec<u8>) -> io::Result<()> {
-        Err(io::Error::new(ErrorKind::Unsupported, "files do not go over this line"))
+        Err(io::Error::new(ErrorKind::Unsupported, "this line cannot carry files"))
     }
 }
 
@@ -45,7 +45,7 @@ pub fn open(place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>> {
     let port: Box<dyn Port> = match place {
         Place::Serial(path) => Box::new(Serial(serial(path, &driver.transport)?)),
         Place::Tcp(address) => Box::new(Tcp(connect(address)?)),
-        Place::Sila(_) => return Err(io::Error::new(ErrorKind::InvalidInput, "a server is no line")),
+        Place::Sila(_) => return Err(io::Error::new(ErrorKind::InvalidInput, "a server is not a line")),
         Place::Http(address) => Box::new(http::open(address, driver)?),
     };
     Ok(Box::new(Held { port, _hold: hold }))
@@ -73,7 +73,7 @@ impl Port for Held {
 
 fn serial(path: &str, transport: &Transport) -> io::Result<SerialPort> {
     let Transport::Serial { baud, data_bits, parity, stop_bits } = *transport else {
-        return Err(io::Error::new(ErrorKind::InvalidInput, "the driver does not speak over a serial port"));
+        return Err(io::Error::new(ErrorKind::InvalidInput, "the driver does not use a serial port"));
     };
     let size = match data_bits {
         5 => CharSize::Bits5,
@@ -177,7 +177,7 @@ fn has_come<T>(_: &T) -> io::Result<bool> {
 fn some(mut read: impl FnMut(&mut [u8]) -> io::Result<usize>) -> io::Result<Vec<u8>> {
     let mut buffer = [0; 1024];
     match read(&mut buffer) {
-        Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "it was closed from there")),
+        Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the other side closed it")),
         Ok(n) => Ok(buffer[..n].to_vec()),
         Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
             Ok(Vec::new())

@@ -26,7 +26,7 @@ impl Server {
         let timeout = Duration::try_from_secs_f64(timeout)
             .ok()
             .filter(|t| !t.is_zero())
-            .ok_or_else(|| DeviceError::Lost("the timeout is no duration".to_owned()))?;
+            .ok_or_else(|| DeviceError::Lost("the timeout is not a duration".to_owned()))?;
         let mut access = access(server).map_err(DeviceError::Unsaid)?;
         let mut failed = None;
         for address in addresses(server, timeout).map_err(DeviceError::Lost)? {
@@ -37,24 +37,24 @@ impl Server {
                         Failure::Lost(why) => DeviceError::Lost(why),
                         Failure::Garbled(why) => DeviceError::Garbled(why),
                         Failure::Refused { name, message } => {
-                            DeviceError::Garbled(format!("it answered `{name}`: {message}"))
+                            DeviceError::Garbled(format!("it replied `{name}`: {message}"))
                         }
                     })?;
                     let promised = definition.and_then(unpacked).unwrap_or_default();
                     return match difference(&promised, &form(client.feature())) {
                         None => Ok(Server(client)),
-                        Some(how) => Err(DeviceError::Garbled(format!("its `{feature}` is another: {how}"))),
+                        Some(how) => Err(DeviceError::Garbled(format!("its `{feature}` differs: {how}"))),
                     };
                 }
                 // It may be reached by another of its addresses.
                 Err(Failure::Lost(why)) => failed = failed.or(Some(why)),
                 Err(Failure::Refused { name, message }) => {
-                    return Err(DeviceError::Garbled(format!("it answered `{name}`: {message}")));
+                    return Err(DeviceError::Garbled(format!("it replied `{name}`: {message}")));
                 }
                 Err(Failure::Garbled(why)) => return Err(DeviceError::Garbled(why)),
             }
         }
-        let missing = || format!("no server with the UUID `{}` is on the network", server.at);
+        let missing = || format!("the network has no server with the UUID `{}`", server.at);
         Err(DeviceError::Lost(failed.unwrap_or_else(missing)))
     }
 }
@@ -83,9 +83,8 @@ fn access(server: &SilaServer) -> Result<Access, String> {
     };
     let login = server.user.as_ref().map(|(user, variable)| {
         let password = std::env::var(variable);
-        let password = password.map_err(|_| {
-            format!("the variable `{variable}` of the environment, which `password_env` names, is not set")
-        });
+        let password =
+            password.map_err(|_| format!("the environment variable `{variable}` of `password_env` is not set"));
         Ok::<_, String>(Login { user: user.clone(), password: password? })
     });
     let lock = server.lock.map(|seconds| Lock { name: who(), lapse: Duration::from_secs(seconds) });
@@ -107,7 +106,7 @@ fn trouble(failure: Failure, driver: &Driver, ear: &mut dyn WireTap) -> DeviceEr
             ear.back(format!("{name}: {message}").as_bytes());
             let named = driver.refusals.iter().find(|r| matched(&r.reply, &name).is_some());
             let failure = named.map_or_else(|| "refused".to_owned(), |named| named.failure.clone());
-            DeviceError::Refused { failure, text: format!("it answered `{name}`: {message}") }
+            DeviceError::Refused { failure, text: format!("it replied `{name}`: {message}") }
         }
     }
 }
@@ -121,7 +120,7 @@ fn goes_on(driver: &Driver, text: &str) -> bool {
 
 fn understood(asked: &str, reply: &str, expects: &Pattern) -> Result<Vec<f64>, DeviceError> {
     matched(expects, reply)
-        .ok_or_else(|| DeviceError::Garbled(format!("to `{asked}` it answered `{reply}`, not `{}`", written(expects))))
+        .ok_or_else(|| DeviceError::Garbled(format!("it replied `{reply}` to `{asked}`, not `{}`", written(expects))))
 }
 
 impl Line for Server {
@@ -176,7 +175,7 @@ impl Line for Server {
         ear.back(reply.as_bytes());
         let found = told.forms().find_map(|(form, shows)| Some((matched(form, &reply)?, form, shows)));
         let Some((numbers, form, shows)) = found else {
-            return Err(DeviceError::Garbled(format!("to `{text}` it answered `{reply}`, not `{}`", forms(told))));
+            return Err(DeviceError::Garbled(format!("it replied `{reply}` to `{text}`, not `{}`", forms(told))));
         };
         showable(told, &numbers, form, shows)
     }

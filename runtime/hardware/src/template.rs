@@ -12,7 +12,7 @@ pub fn filled(template: &Template, mut value: impl FnMut(NodeId) -> Option<f64>)
             Piece::Plain(text) => out.push_str(text),
             Piece::Number { value: node, unit, form } => {
                 let known = value(*node).filter(|v| v.is_finite());
-                let known = known.ok_or_else(|| format!("a number of `{}` is not known", written(template)))?;
+                let known = known.ok_or_else(|| format!("a number of `{}` is unknown", written(template)))?;
                 let sent = form
                     .put(unit, known)
                     .map_err(|why| format!("{} cannot be sent in `{}`: {why}", unit.show(known), written(template)))?;
@@ -20,7 +20,7 @@ pub fn filled(template: &Template, mut value: impl FnMut(NodeId) -> Option<f64>)
             }
             Piece::Word(node, words) => {
                 let word = value(*node).and_then(|index| words.get(index as usize));
-                out.push_str(word.ok_or_else(|| format!("a word of `{}` is not known", written(template)))?);
+                out.push_str(word.ok_or_else(|| format!("a word of `{}` is unknown", written(template)))?);
             }
         }
     }

@@ -96,7 +96,7 @@ impl Trajectory {
         let told = topic(&recording, "/bodies").and_then(|t| t.messages.first());
         let Some((_, bodies)) = told else {
             return Err(Unreadable(
-                "it has no `/bodies`: nothing in it has a shape, or it is older than that".to_owned(),
+                "it has no `/bodies`: nothing in it has a shape, or an older version wrote it".to_owned(),
             ));
         };
         let bodies = Bodies::deserialize(bodies).map_err(|e| Unreadable(format!("`/bodies` is damaged: {e}")))?;
@@ -243,7 +243,7 @@ fn is_tree(machine: &Machine) -> Result<(), Unreadable> {
     if grown && named {
         return Ok(());
     }
-    Err(Unreadable(format!("`/bodies` is damaged: the links of `{}` are no tree", machine.name)))
+    Err(Unreadable(format!("`/bodies` is damaged: the links of `{}` do not form a tree", machine.name)))
 }
 
 fn robot(machine: Machine, recording: &Recording, ways: &Ways, things: &[Thing]) -> Result<Robot, Unreadable> {
@@ -266,7 +266,7 @@ fn robot(machine: Machine, recording: &Recording, ways: &Ways, things: &[Thing])
         }
         let links: Option<Vec<Isometry>> = link_ways.iter().map(|way| last(way, *time)).collect();
         let (true, Some(links)) = (states.len() == names.len(), links) else {
-            return Err(Unreadable(format!("`{name}` is recorded in part only at {time} s")));
+            return Err(Unreadable(format!("the record of `{name}` is incomplete at {time} s")));
         };
         let all = |key: &str| states.iter().map(|s| number(s, key)).collect();
         samples.push(Sample {

@@ -145,22 +145,28 @@ impl Wrong {
         match self {
             Wrong::Meets { mine, other, depth, at, .. } => {
                 let [x, y, z] = at.map(|v| v * 1e3);
-                format!("`{mine}` is {} deep in `{other}` at ({x:.0}, {y:.0}, {z:.0}) mm", mm(*depth))
+                format!("`{mine}` is {} inside `{other}` at ({x:.0}, {y:.0}, {z:.0}) mm", mm(*depth))
             }
             Wrong::Beyond { joint, what, value, limit, .. } => {
-                format!("{what} of `{joint}` is {value:.4}, its limit {limit:.4}")
+                format!("{what} of `{joint}` is {value:.4}, above its limit {limit:.4}")
             }
-            Wrong::Jumps { joint, by, .. } => format!("`{joint}` is {by:.4} away from where its speed takes it"),
-            Wrong::Astray { link, by, .. } => format!("`{link}` is {} away from where the joints put it", mm(*by)),
+            Wrong::Jumps { joint, by, .. } => {
+                format!("`{joint}` is {by:.4} away from the position that its speed gives")
+            }
+            Wrong::Astray { link, by, .. } => {
+                format!("`{link}` is {} away from the position that the joints give", mm(*by))
+            }
             Wrong::Off { item, by, .. } => format!("`{item}` is gripped {} away from its nearest frame", mm(*by)),
             Wrong::Spills { item, volume, tilt, .. } => {
                 let (volume, tilt) = (volume * 1e6, tilt.to_degrees());
-                format!("{volume:.1} mL run over the rim of `{item}`, whose contents stand {tilt:.0} deg across it")
+                format!("{volume:.1} mL spill over the rim of `{item}`, tilted {tilt:.0} deg against its contents")
             }
             Wrong::Slips { item, pull, borne, .. } => {
-                format!("`{item}` is pulled at {pull:.1} m/s2 with gravity, and the grip on it bears {borne:.1} m/s2")
+                format!(
+                    "`{item}` is pulled with {pull:.1} m/s2 including gravity, but its grip holds only {borne:.1} m/s2"
+                )
             }
-            Wrong::Dropped { item, .. } => format!("`{item}` is let go with nothing below it"),
+            Wrong::Dropped { item, .. } => format!("`{item}` is released with nothing below it"),
         }
     }
 }

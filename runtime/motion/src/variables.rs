@@ -28,15 +28,15 @@ pub enum Malformed {
 impl fmt::Display for Malformed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoLink(index) => write!(f, "there is no link {index}"),
+            Self::NoLink(index) => write!(f, "link {index} does not exist"),
             Self::Dangling(joint) => write!(f, "joint `{joint}` does not fit into a tree of links"),
-            Self::Order(joint) => write!(f, "joint `{joint}` comes before the joint that carries its parent"),
+            Self::Order(joint) => write!(f, "joint `{joint}` comes before the joint of its parent"),
             Self::FollowsItself(joint) => write!(f, "joint `{joint}` follows itself"),
             Self::NoLimits(joint) => write!(f, "joint `{joint}` moves but has no limits"),
             Self::Nowhere(joint) => {
-                write!(f, "the limits of joint `{joint}` and of those that follow it leave no position")
+                write!(f, "the limits of joint `{joint}` and of its followers allow no position")
             }
-            Self::Axis(joint) => write!(f, "the axis of joint `{joint}` is not of unit length"),
+            Self::Axis(joint) => write!(f, "the axis of joint `{joint}` must have length 1"),
             Self::Apart(a, b) => write!(f, "links {a} and {b} are not connected"),
         }
     }

@@ -30,11 +30,11 @@ impl Failure {
         match status.code() {
             Code::Aborted => match STANDARD.decode(message).ok().and_then(|b| Error::decode(b.as_slice()).ok()?.kind) {
                 Some(kind) => named(kind),
-                None => Failure::Garbled(format!("it ended a call with `{}`, which is no error of SiLA", cut(message))),
+                None => Failure::Garbled(format!("it ended a call with `{}`, which is not a SiLA error", cut(message))),
             },
             Code::Unimplemented => Failure::Garbled("it does not know this call".to_owned()),
             Code::Unavailable | Code::Cancelled | Code::DeadlineExceeded | Code::Unknown | Code::Internal => {
-                Failure::Lost(format!("the connection broke off: {}", cut(message)))
+                Failure::Lost(format!("the connection was lost: {}", cut(message)))
             }
             other => Failure::Garbled(format!("it ended a call with {other:?}: {}", cut(message))),
         }

@@ -127,7 +127,7 @@ impl Client {
                 access.address
             )),
             None if access.trust != Trust::Plain && dial::is_plain(&e) => {
-                lost(format!("it does not speak TLS ({}): leave out its certificate or fingerprint", source(&e)))
+                lost(format!("it does not use TLS ({}): remove its certificate or fingerprint", source(&e)))
             }
             None => lost(source(&e)),
         });
@@ -258,13 +258,13 @@ impl Client {
         let call = text::call(asked).map_err(Failure::Garbled)?;
         let key = self.place(&call).map_err(Failure::Garbled)?;
         let Some(command) = self.features[key.0].command(&key.1).cloned() else {
-            return Err(Failure::Garbled(format!("`{asked}` is no command")));
+            return Err(Failure::Garbled(format!("`{asked}` is not a command")));
         };
         let Some(running) = self.running.get_mut(&key) else {
             return match self.last.contains_key(&key) {
                 true => Ok(true),
                 false => Err(Failure::Garbled(format!(
-                    "`{}` was not begun over this connection: whether it has ended is not known",
+                    "`{}` was not started over this connection: its end is unknown",
                     key.1
                 ))),
             };
@@ -313,7 +313,7 @@ impl Client {
                 }
                 // The first news of a command come when the server has them.
                 if !(tells && self.running.contains_key(&key)) || asked.elapsed() >= self.timeout {
-                    return Err(Failure::Garbled(format!("`{command}` has not told `{response}`")));
+                    return Err(Failure::Garbled(format!("`{command}` did not return `{response}`")));
                 }
                 std::thread::sleep(GLANCE);
             }
@@ -329,7 +329,7 @@ impl Client {
         let (of, known, name): (String, Vec<String>, &str) = match call.path.as_slice() {
             [command, response] if self.features[0].command(command).is_some() => {
                 let known = self.features[0].command(command).map(responses).unwrap_or_default();
-                (format!("the command `{command}` answers no"), known, response)
+                (format!("the command `{command}` replied no"), known, response)
             }
             _ => {
                 let (index, _) = self.place(&call)?;
@@ -357,7 +357,7 @@ impl Client {
                 let found = found.ok_or_else(|| format!("it offers no feature `{feature}`"))?;
                 Ok((found, name.clone()))
             }
-            _ => Err("nothing is named".to_owned()),
+            _ => Err("the name is empty".to_owned()),
         }
     }
 
@@ -369,7 +369,7 @@ impl Client {
         let raw: Raw = if property.observable {
             let mut all = self.stream(index, &format!("Subscribe_{name}"), Raw::default())?;
             let first = within(&self.runtime, self.timeout, all.message()).ok_or_else(|| self.silent(name))?;
-            first.map_err(|s| Failure::of(&s))?.ok_or_else(|| Failure::Garbled(format!("`{name}` told nothing")))?
+            first.map_err(|s| Failure::of(&s))?.ok_or_else(|| Failure::Garbled(format!("`{name}` returned nothing")))?
         } else {
             self.unary(index, &format!("Get_{name}"), Raw::default())?
         };
@@ -381,7 +381,7 @@ impl Client {
         };
         let values = self.answered(index, std::slice::from_ref(&told), &raw)?;
         let value = values.into_iter().next().map(|(_, value)| value);
-        value.ok_or_else(|| Failure::Garbled(format!("`{name}` told nothing")))
+        value.ok_or_else(|| Failure::Garbled(format!("`{name}` returned nothing")))
     }
 
     /// A command that does not last, from its beginning to its end.
@@ -415,7 +415,7 @@ impl Client {
     fn begin(&mut self, index: usize, command: &Command, values: &[Value]) -> Result<(), Failure> {
         let raw = self.given(index, command, values)?;
         let confirmed: Confirmation = self.unary(index, &command.identifier, raw)?;
-        let execution = confirmed.execution.ok_or_else(|| Failure::Garbled("it names no execution".to_owned()))?;
+        let execution = confirmed.execution.ok_or_else(|| Failure::Garbled("the reply has no execution".to_owned()))?;
         let news = self.stream(index, &format!("{}_Info", command.identifier), execution.clone())?;
         let told = match command.intermediate.as_slice() {
             [] => None,

@@ -91,9 +91,9 @@ impl std::fmt::Display for Moment {
 /// A moment as it is written; why it is none.
 pub(crate) fn written(which: Which, text: &str) -> Result<Moment, String> {
     let form = match which {
-        Which::Date => "no day, which is written as in `2026-11-23+01:00`",
-        Which::Time => "no time of day, which is written as in `14:30:00+01:00`",
-        Which::Stamp => "no day with a time, which are written as in `2026-11-23T14:30:00+01:00`",
+        Which::Date => "not a date as in `2026-11-23+01:00`",
+        Which::Time => "not a time of day as in `14:30:00+01:00`",
+        Which::Stamp => "not a date with a time as in `2026-11-23T14:30:00+01:00`",
     };
     let read = || {
         let stamp = match which {
@@ -169,7 +169,7 @@ pub(crate) fn encoded(moment: &Moment) -> Vec<u8> {
 
 /// The moment of a message; why it is none.
 pub(crate) fn decoded(which: Which, bytes: &[u8]) -> Result<Moment, String> {
-    let none = || "it is no moment".to_owned();
+    let none = || "it is not a date or time".to_owned();
     let day = |year: u32, month, day| NaiveDate::from_ymd_opt(i32::try_from(year).ok()?, month, day);
     match which {
         Which::Date => {

@@ -150,7 +150,7 @@ pub fn serve(
     door: Door,
     features: Vec<Feature>,
 ) -> Result<(Server, mpsc::Receiver<Request>), String> {
-    let failed = |e: std::io::Error| format!("cannot answer at `{address}`: {e}");
+    let failed = |e: std::io::Error| format!("cannot listen on `{address}`: {e}");
     let tls = door.identity.as_ref().map(tls::acceptor).transpose()?;
     let runtime = Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(failed)?;
     let listener = runtime.block_on(TcpListener::bind(address)).map_err(failed)?;

@@ -35,29 +35,29 @@ pub fn feature() -> Feature {
     Feature {
         identifier: IDENTIFIER.to_owned(),
         display: "SiLA Service".to_owned(),
-        description: "What every server says of itself and of its features.".to_owned(),
+        description: "Information about the server and its features.".to_owned(),
         originator: "org.silastandard".to_owned(),
         category: "core".to_owned(),
         version: (1, 0),
         commands: vec![
             Command {
                 parameters: vec![element("FeatureIdentifier", "The full identifier of a feature.")],
-                responses: vec![element("FeatureDefinition", "Its definition as XML.")],
+                responses: vec![element("FeatureDefinition", "The definition as XML.")],
                 errors: vec![UNIMPLEMENTED.to_owned()],
-                ..command("GetFeatureDefinition", "Gives the definition of a feature.")
+                ..command("GetFeatureDefinition", "Returns the definition of a feature.")
             },
             Command {
-                parameters: vec![element("ServerName", "The name from now on.")],
+                parameters: vec![element("ServerName", "The new name.")],
                 ..command("SetServerName", "Names the server.")
             },
         ],
         properties: vec![
             property("ServerName", "Its name.", text()),
-            property("ServerType", "What kind of server it is.", text()),
+            property("ServerType", "The type of the server.", text()),
             property("ServerUUID", "Its identifier.", text()),
-            property("ServerDescription", "What it is for.", text()),
+            property("ServerDescription", "The purpose of the server.", text()),
             property("ServerVersion", "The version of its program.", text()),
-            property("ServerVendorURL", "Where its program comes from.", text()),
+            property("ServerVendorURL", "The website of the vendor of its program.", text()),
             property("ImplementedFeatures", "The full identifiers of its features.", features),
         ],
         metadata: Vec::new(),

@@ -34,7 +34,7 @@ pub fn call(text: &str) -> Result<Call, String> {
     let path: Vec<String> = head.split('.').map(|p| p.trim().to_owned()).collect();
     let is_identifier = |p: &String| !p.is_empty() && p.chars().all(|c| c.is_ascii_alphanumeric());
     if path.len() > 2 || !path.iter().all(is_identifier) {
-        return Err(format!("`{head}` is no command or property: write `Command(Parameter: value)`"));
+        return Err(format!("`{head}` is not a command or property: write `Command(Parameter: value)`"));
     }
     let named = |part: &str| {
         let (name, value) =
@@ -55,7 +55,11 @@ fn parts(text: &str) -> Result<Vec<&str>, String> {
             '"' => quoted = !quoted,
             _ if quoted => {}
             '[' | '{' => depth += 1,
-            ']' | '}' => depth = depth.checked_sub(1).ok_or_else(|| format!("`{text}` closes what is not open"))?,
+            ']' | '}' => {
+                depth = depth
+                    .checked_sub(1)
+                    .ok_or_else(|| format!("`{text}` has a closing bracket without an opening one"))?
+            }
             ',' if depth == 0 => {
                 out.push(&text[from..at]);
                 from = at + 1;
@@ -88,20 +92,20 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
             value
         }
         DataType::Identifier(name) => {
-            let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
+            let of = feature.resolved(ty).ok_or_else(|| format!("unknown type `{name}`"))?;
             within(feature, of, text, depth + 1)?
         }
         DataType::Basic(Basic::String) => Value::Text(unquoted(text)?),
         DataType::Basic(Basic::Real) => {
             let number = text.parse::<f64>().ok().filter(|n| n.is_finite());
-            Value::Real(number.ok_or_else(|| format!("`{text}` is no number"))?)
+            Value::Real(number.ok_or_else(|| format!("`{text}` is not a number"))?)
         }
         DataType::Basic(Basic::Integer) => {
             let whole = text.parse::<i64>().ok().or_else(|| {
                 let number = text.parse::<f64>().ok()?;
                 (number.fract() == 0.0 && number.abs() < 9e15).then_some(number as i64)
             });
-            Value::Integer(whole.ok_or_else(|| format!("`{text}` is no whole number"))?)
+            Value::Integer(whole.ok_or_else(|| format!("`{text}` is not a whole number"))?)
         }
         DataType::Basic(Basic::Boolean) => match text {
             "true" | "1" => Value::Boolean(true),
@@ -115,13 +119,13 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
         DataType::Basic(Basic::Any) => return Err("a value of type Any cannot be written here".to_owned()),
         DataType::List(of) => {
             let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']'));
-            let inner = inner.ok_or_else(|| format!("`{text}` is no list: write `[1, 2]`"))?;
+            let inner = inner.ok_or_else(|| format!("`{text}` is not a list: write `[1, 2]`"))?;
             let values = parts(inner)?.into_iter().map(|p| within(feature, of, p.trim(), depth + 1));
             Value::List(values.collect::<Result<_, _>>()?)
         }
         DataType::Structure(elements) => {
             let inner = text.strip_prefix('{').and_then(|t| t.strip_suffix('}'));
-            let inner = inner.ok_or_else(|| format!("`{text}` is no structure: write `{{Part: value}}`"))?;
+            let inner = inner.ok_or_else(|| format!("`{text}` is not a structure: write `{{Part: value}}`"))?;
             let named = |p: &'_ str| {
                 let (name, value) = p.split_once(':')?;
                 Some((name.trim().to_owned(), value.trim().to_owned()))
@@ -132,7 +136,7 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
                     named(part).ok_or_else(|| format!("`{}` has no name: write `Part: value`", part.trim()))?;
                 if !elements.iter().any(|e| e.identifier == name) {
                     let known: Vec<String> = elements.iter().map(|e| format!("`{}`", e.identifier)).collect();
-                    return Err(format!("there is no part `{name}`; there are {}", known.join(", ")));
+                    return Err(format!("unknown part `{name}`; use {}", known.join(", ")));
                 }
                 if given.iter().any(|(other, _)| *other == name) {
                     return Err(format!("`{name}` is given twice"));
@@ -152,7 +156,7 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
 /// Bytes in Base64, or those of a file: `file "methods/warm.bin"`.
 fn bytes(text: &str) -> Result<Vec<u8>, String> {
     let Some(path) = text.strip_prefix("file ") else {
-        return STANDARD.decode(unquoted(text)?).map_err(|e| format!("`{text}` is no Base64: {e}"));
+        return STANDARD.decode(unquoted(text)?).map_err(|e| format!("`{text}` is not Base64: {e}"));
     };
     let path = unquoted(path.trim())?;
     let failed = |e: std::io::Error| format!("`{path}` cannot be read: {e}");
@@ -173,10 +177,10 @@ fn unquoted(text: &str) -> Result<String, String> {
     loop {
         match chars.next() {
             Some('"') if chars.as_str().is_empty() => return Ok(out),
-            Some('"') => return Err(format!("`{text}` goes on after its closing quote")),
+            Some('"') => return Err(format!("`{text}` has text after its closing quote")),
             Some('\\') => match chars.next() {
                 Some(c @ ('"' | '\\')) => out.push(c),
-                _ => return Err(format!("in `{text}` a `\\` stands before neither `\"` nor `\\`")),
+                _ => return Err(format!("in `{text}` a `\\` must come before `\"` or `\\`")),
             },
             Some(c) => out.push(c),
             None => return Err(format!("`{text}` is not closed")),

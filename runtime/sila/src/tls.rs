@@ -28,7 +28,7 @@ pub(crate) fn acceptor(identity: &Identity) -> Result<TlsAcceptor, String> {
     let config = ServerConfig::builder_with_provider(provider()).with_safe_default_protocol_versions();
     let config = config.map_err(|e| e.to_string())?.with_no_client_auth().with_single_cert(chain, key);
     let mut config = config.map_err(|e| match e {
-        Error::InconsistentKeys(_) => "the certificate and the key do not go together".to_owned(),
+        Error::InconsistentKeys(_) => "the certificate and the key do not belong together".to_owned(),
         other => format!("the certificate and the key cannot be used: {other}"),
     })?;
     config.alpn_protocols = vec![HTTP2.to_vec()];

@@ -89,15 +89,15 @@ fn message(feature: &Feature, ty: &DataType, value: &Value) -> Result<Vec<u8>, S
             raw.encode_to_vec()
         }
         (DataType::Identifier(name), value) => {
-            let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
+            let of = feature.resolved(ty).ok_or_else(|| format!("unknown type `{name}`"))?;
             let mut raw = Raw::default();
             put(feature, of, value, 1, &mut raw)?;
             raw.encode_to_vec()
         }
         (DataType::Constrained(inner, _), value) => return message(feature, inner, value),
-        (DataType::Basic(basic), _) => return Err(format!("it is no {}", basic.name())),
-        (DataType::Structure(_), _) => return Err("it is no structure".to_owned()),
-        (DataType::List(_), _) => return Err("it is no list".to_owned()),
+        (DataType::Basic(basic), _) => return Err(format!("it is not of the type {}", basic.name())),
+        (DataType::Structure(_), _) => return Err("it is not a structure".to_owned()),
+        (DataType::List(_), _) => return Err("it is not a list".to_owned()),
     })
 }
 
@@ -123,7 +123,7 @@ fn take(feature: &Feature, ty: &DataType, number: u32, raw: &Raw) -> Result<Valu
     match (all.next(), all.next()) {
         (Some(bytes), None) => understood(feature, ty, bytes),
         (None, _) => Err("it is missing".to_owned()),
-        (_, Some(_)) => Err("it is there twice".to_owned()),
+        (_, Some(_)) => Err("it is given twice".to_owned()),
     }
 }
 
@@ -139,7 +139,7 @@ fn understood(feature: &Feature, ty: &DataType, bytes: &[u8]) -> Result<Value, S
         DataType::Basic(Basic::Binary) => match read::<Binary>(bytes)?.held {
             Some(Held::Here(bytes)) => Value::Bytes(bytes),
             Some(Held::Kept(uuid)) => Value::Kept(uuid),
-            None => return Err("it holds no bytes".to_owned()),
+            None => return Err("it contains no bytes".to_owned()),
         },
         DataType::Basic(Basic::Date) => Value::Moment(moment::decoded(Which::Date, bytes)?),
         DataType::Basic(Basic::Time) => Value::Moment(moment::decoded(Which::Time, bytes)?),
@@ -155,7 +155,7 @@ fn understood(feature: &Feature, ty: &DataType, bytes: &[u8]) -> Result<Value, S
             Value::Structure(parts.iter().zip(1..).map(part).collect::<Result<_, _>>()?)
         }
         DataType::Identifier(name) => {
-            let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
+            let of = feature.resolved(ty).ok_or_else(|| format!("unknown type `{name}`"))?;
             take(feature, of, 1, &read::<Raw>(bytes)?)?
         }
         DataType::Constrained(inner, constraints) => {
@@ -163,7 +163,7 @@ fn understood(feature: &Feature, ty: &DataType, bytes: &[u8]) -> Result<Value, S
             fits(&value, constraints)?;
             value
         }
-        DataType::List(_) => return Err("a list holds no lists".to_owned()),
+        DataType::List(_) => return Err("a list cannot contain lists".to_owned()),
     })
 }
 
@@ -196,10 +196,10 @@ pub fn fits(value: &Value, constraints: &Constraints) -> Result<(), String> {
         _ => number.is_none() || allowed.parse::<f64>().ok() == number,
     };
     if !constraints.set.is_empty() && !constraints.set.iter().any(is_it) {
-        return Err(format!("`{shown}` is none of {}", constraints.set.join(", ")));
+        return Err(format!("`{shown}` is not one of {}", constraints.set.join(", ")));
     }
     if number.is_some_and(|n| !n.is_finite()) {
-        return Err(format!("{shown} is no finite number"));
+        return Err(format!("{shown} is not a finite number"));
     }
     match value {
         Value::Text(text) => {
@@ -224,7 +224,6 @@ fn within(size: usize, (least, most): (Option<u64>, Option<u64>), of: &str) -> R
 /// Whether a pattern matches the whole of a text; why not.
 fn matches(text: &str, pattern: &str) -> Result<(), String> {
     let whole = regex_lite::Regex::new(&format!("^(?:{pattern})$"));
-    let whole =
-        whole.map_err(|_| format!("its pattern `{pattern}` is not understood here, so nothing can be checked"))?;
+    let whole = whole.map_err(|_| format!("its pattern `{pattern}` is not supported, so it cannot be checked"))?;
     if whole.is_match(text) { Ok(()) } else { Err(format!("`{text}` does not match `{pattern}`")) }
 }

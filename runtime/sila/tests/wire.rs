@@ -223,7 +223,7 @@ fn encrypted_servers_are_trusted_by_certificate_or_fingerprint_and_no_others() {
 
     let (_server, address) = served(Door::default());
     let failed = Client::connect(&Access { trust: Trust::Fingerprint(digest), ..plain(&address) }, ID, TIME).err();
-    assert!(failed.is_some_and(|f| format!("{f:?}").contains("does not speak TLS")));
+    assert!(failed.is_some_and(|f| format!("{f:?}").contains("does not use TLS")));
 }
 
 #[test]

@@ -88,7 +88,7 @@ impl<'m> Dry<'m> {
                 return Ok(());
             }
         }
-        let message = format!("more than {CASCADE} events follow from one another within an instant");
+        let message = format!("events trigger each other more than {CASCADE} times at one instant");
         Err(Fault::new(codes::RUN_FAILED, self.time, message))
     }
 

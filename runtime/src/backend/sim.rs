@@ -188,7 +188,7 @@ impl<'m> Sim<'m> {
         let there = real.as_ref().unwrap_or(stage);
         let (id, met) = self.moves.robots.then(|| there.swing_meets(&moved)).flatten()?;
         let name = &stage.scene.get(id).name;
-        Some(format!("`{}` of `{name}` runs into {} at {}", met.mine, met.whom(), met.place()))
+        Some(format!("`{}` of `{name}` collides with {} at {}", met.mine, met.whom(), met.place()))
     }
 
     /// Tells how what robots carry may be moved now; what of it runs over where it is is said.
@@ -222,8 +222,8 @@ impl<'m> Sim<'m> {
         let (vessel, over) = (name(vessel), over * 1e6);
         // Of what fills it steadily the first drops are not worth a number.
         let by_how_much =
-            if over < 0.1 { String::new() } else { format!(": {over:.1} mL more are in it than it keeps so") };
-        format!("`{by}` holds `{vessel}` tilted by {tilt:.0} deg, and it runs over{by_how_much}")
+            if over < 0.1 { String::new() } else { format!(": {over:.1} mL more than it can hold at this angle") };
+        format!("`{vessel}` spills: `{by}` holds it tilted by {tilt:.0} deg{by_how_much}")
     }
 
     /// Whether a robot carries a vessel that something may run out of.
@@ -425,7 +425,7 @@ impl<'m> Sim<'m> {
                 let seen = stage.map_or(0, |s| s.changes());
                 return Ok(Ends::Blocked { operation: Box::new(operation.clone()), begun, until, seen });
             }
-            text.push_str(&format!(", and it did not go away within {} s", show_number(now - begun)));
+            text.push_str(&format!(", which did not move away within {} s", show_number(now - begun)));
         }
         Ok(Ends::Failed(refused.failure().to_string(), text))
     }
@@ -543,7 +543,7 @@ impl<'m> Sim<'m> {
         if nominal.is_finite() && nominal >= 0.0 {
             return Ok(Ends::At(self.moment_after(nominal)));
         }
-        let message = format!("`{}` takes {} s, which is not a duration", operation.verb, show_number(nominal));
+        let message = format!("`{}` would take {} s, which is not a duration", operation.verb, show_number(nominal));
         Err(Fault::new(codes::UNUSABLE_NUMBER, now, message))
     }
 
@@ -766,7 +766,7 @@ impl Sim<'_> {
             self.look_again(None, out)?;
             if self.running.is_empty() {
                 let fault = Fault::new(codes::COLLISION, now, text);
-                return Err(fault.help("see what held it, and what touched it"));
+                return Err(fault.help("check which robot held it and which thing touched it"));
             }
             self.befallen.get_or_insert((failure, text));
         }
@@ -782,7 +782,7 @@ impl Sim<'_> {
         if let Some(text) = met {
             if self.running.is_empty() {
                 let fault = Fault::new(codes::COLLISION, self.engine.time(), text);
-                return Err(fault.help("move it out of the way, or end the motion before it gets there"));
+                return Err(fault.help("move it out of the way, or end the motion earlier"));
             }
             self.befallen.get_or_insert(("collision", text));
         }
@@ -790,7 +790,7 @@ impl Sim<'_> {
         if let Some(text) = overflow.map(|overflow| self.overflow(overflow)) {
             if self.running.is_empty() {
                 let fault = Fault::new(codes::SPILLED, self.engine.time(), text);
-                return Err(fault.help("set it upright, or stop what fills it before it runs over"));
+                return Err(fault.help("set it upright, or stop filling it earlier"));
             }
             self.befallen.get_or_insert(("spilled", text));
         }

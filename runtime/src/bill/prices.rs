@@ -58,7 +58,7 @@ impl Prices {
             let cell = |at: usize| record.get(at).unwrap_or_default();
             let number = |at: usize| {
                 let value = cell(at).parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
-                value.ok_or_else(|| format!("line {line}: `{}` is no {}", cell(at), COLUMNS[at]))
+                value.ok_or_else(|| format!("line {line}: `{}` is not a valid {}", cell(at), COLUMNS[at]))
             };
             let (item, unit) = (cell(0).to_owned(), cell(4).to_owned());
             if !UNITS.iter().any(|u| u.0 == unit) {
@@ -148,7 +148,7 @@ mod tests {
         let head = "item,price,currency,quantity,unit\n";
         for (text, wanted) in [
             ("name,price\n", "the first line must be `item,price,currency,quantity,unit`"),
-            ("water,dear,EUR,1,L\n", "line 2: `dear` is no price"),
+            ("water,dear,EUR,1,L\n", "line 2: `dear` is not a valid price"),
             ("water,1,EUR,0,L\n", "line 2: a price is for more than 0 L"),
             ("water,1,EUR,1,bottle\n", "line 2: `bottle` is not one of mg, g, kg, mL, L, piece, pack"),
             ("water,1,EUR,1,L\nwater,2,EUR,1,L\n", "line 3: `water` has a price already"),

@@ -35,7 +35,7 @@ impl<'p> Matter<'p> {
         if let Some(carrier) = stage.scene.carriers.first() {
             let name = &stage.scene.get(carrier.by).name;
             return Err(format!(
-                "`{name}` takes things along without a grip, such as tips: that is not modelled with `--fidelity contact`"
+                "`{name}` carries things without a grip, such as tips: this is not modelled with `--fidelity contact`"
             ));
         }
         let (world, names, ids, unknown) = (World::new(), Vec::new(), BTreeMap::new(), BTreeSet::new());
@@ -262,7 +262,7 @@ fn slides(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Result<Option<
         let (JointKind::Prismatic, true, Some(at)) = (joint.kind, even, position(leader)) else {
             let name = &stage.scene.get(robot).name;
             return Err(format!(
-                "the finger joint `{}` of `{name}` does not slide as its gripper closes: only grippers with two fingers that slide are modelled with `--fidelity contact`",
+                "the finger joint `{}` of `{name}` does not slide when its gripper closes: `--fidelity contact` models only grippers with two sliding fingers",
                 joint.name
             ));
         };
@@ -271,7 +271,7 @@ fn slides(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Result<Option<
     match <[Slide; 2]>::try_from(out) {
         Ok(two) if two[0].joint.parent == two[1].joint.parent => Ok(Some(two)),
         _ => Err(format!(
-            "`{}` has no two fingers on one hand: other grippers are not modelled with `--fidelity contact`",
+            "`{}` does not have two fingers on one hand: `--fidelity contact` models no other grippers",
             stage.scene.get(robot).name
         )),
     }

@@ -188,11 +188,11 @@ impl Matter<'_> {
         let machine = self.machines.get(&robot)?;
         let Some(loose) = self.loose.get(&item) else {
             let name = &self.scene.get(item).name;
-            let text = format!("`{name}` has no mass, no shape or no place of its own: a grip on it is not modelled");
+            let text = format!("`{name}` lacks a mass, a shape or its own place: a grip on it is not modelled");
             return Some(Verdict::Failed("unmovable", text));
         };
         let Some(hand) = machine.hand.as_ref() else {
-            let text = format!("`{}` has no fingers that move: its grip is not modelled", self.scene.get(robot).name);
+            let text = format!("`{}` has no moving fingers: its grip is not modelled", self.scene.get(robot).name);
             return Some(Verdict::Failed("unmovable", text));
         };
         let pinch = self.world.pinch(hand.grip, loose.body);

@@ -30,11 +30,11 @@ impl Matter<'_> {
         let friction = fingers.clone().map(|touch| touch.friction).fold(f64::INFINITY, f64::min);
         let weight = self.laden(item) * GRAVITY;
         if !friction.is_finite() {
-            return format!("it weighs {weight:.1} N, and neither finger touches it any more");
+            return format!("it weighs {weight:.1} N, and no finger touches it now");
         }
         let bears = 2.0 * friction * hand.force;
         format!(
-            "each finger presses with {:.1} N, which bears {bears:.1} N at a friction of {friction:.2}, and it weighs {weight:.1} N",
+            "each finger presses with {:.1} N and holds {bears:.1} N at a friction of {friction:.2}, but it weighs {weight:.1} N",
             hand.force
         )
     }
@@ -61,7 +61,7 @@ impl Matter<'_> {
         let (name, hand, what) = (self.called(item), self.called(robot), self.body(by.by));
         let [x, y, z] = by.point.map(|m| m * 1e3);
         format!(
-            "`{name}` is stopped by {what} at ({x:.0}, {y:.0}, {z:.0}) mm, which presses on it with {:.1} N, and has moved {} in the fingers of `{hand}`",
+            "`{name}` is stopped by {what} at ({x:.0}, {y:.0}, {z:.0}) mm, which presses on it with {:.1} N, and moves {} in the fingers of `{hand}`",
             by.pressed(),
             moved(far, turned)
         )
@@ -97,7 +97,7 @@ impl Matter<'_> {
             Some(touch) => {
                 format!("{} pushes `{name}` {how}, with {:.1} N", self.body(touch.by), touch.pressed())
             }
-            None => format!("`{name}` moves {how} from where it stood, and no robot touches it"),
+            None => format!("`{name}` moves {how} from its place, and no robot touches it"),
         }
     }
 
@@ -111,8 +111,11 @@ impl Matter<'_> {
         let on = self.loose.get(&item).and_then(|loose| self.bearer(loose.body));
         let on = on.map_or("nothing".to_string(), |on| format!("`{}`", self.called(on)));
         match toppled {
-            true => format!("`{name}` leans by {:.0} deg after `{hand}` has let it go, on {on}", lean.to_degrees()),
-            false => format!("`{name}` comes to rest {:.1} mm from where `{hand}` was to put it, on {on}", far * 1e3),
+            true => format!("`{name}` leans by {:.0} deg on {on} after `{hand}` has released it", lean.to_degrees()),
+            false => format!(
+                "`{name}` comes to rest on {on}, {:.1} mm from the place where `{hand}` should put it",
+                far * 1e3
+            ),
         }
     }
 
@@ -129,7 +132,7 @@ impl Matter<'_> {
         lost.map(|(id, now, on)| {
             let [x, y, z] = now.position.map(|m| m * 1e3);
             let on = on.map_or("the floor".to_string(), |on| format!("`{}`", self.called(on)));
-            format!("; `{}` lies at ({x:.0}, {y:.0}, {z:.0}) mm then, on {on}", self.called(id))
+            format!("; `{}` then lies at ({x:.0}, {y:.0}, {z:.0}) mm on {on}", self.called(id))
         })
         .collect()
     }

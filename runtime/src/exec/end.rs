@@ -60,7 +60,7 @@ impl<'p> Executor<'p, '_> {
     /// A `retry` that no handler took is a failure.
     pub(super) fn stray(&mut self, end: End) -> End {
         let End::Retry(_) = end else { return end };
-        let raised = Raised::named("retry", "`retry` stands only in a handler");
+        let raised = Raised::named("retry", "`retry` is only for handlers");
         End::Failed(Box::new(self.trace(0, raised)))
     }
 
@@ -221,7 +221,8 @@ impl<'p> Executor<'p, '_> {
         undone.sort_by_key(|step| plan.get(*step).span.start);
         let labels: Vec<String> = undone.iter().map(|id| format!("`{}`", plan.get(*id).label)).collect();
         if !labels.is_empty() {
-            let raised = Raised::named("unfinished", format!("a `finally` broke off: {} not done", labels.join(", ")));
+            let raised =
+                Raised::named("unfinished", format!("a `finally` stopped early: {} did not run", labels.join(", ")));
             let trace = self.trace(id, Raised { span: Some(plan.get(*finally).span), ..raised });
             self.state.suppressed.push(trace);
         }
@@ -248,7 +249,7 @@ impl<'p> Executor<'p, '_> {
                 if !holds.unwrap_or(first) {
                     self.push_end(id, End::Done);
                 } else if left == 0 {
-                    let text = format!("`{}` still holds after the last turn", condition.text);
+                    let text = format!("`{}` is still true after the last turn", condition.text);
                     let raised = self.unmet(condition, "max", codes::RUN_FAILED, text);
                     self.fail(id, raised);
                 } else {

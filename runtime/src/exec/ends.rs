@@ -39,7 +39,7 @@ impl<'p> Executor<'p, '_> {
                 continue;
             }
             let how = end.condition.refusal.as_ref().map_or("unfinished".to_owned(), |r| r.failure.replace('_', " "));
-            let text = format!("`{}` has ended, and `{}` is {how}", self.plan.workflow, self.instance(end.instance));
+            let text = format!("`{}` is {how} after the end of `{}`", self.instance(end.instance), self.plan.workflow);
             let steps = self.last_use(end.instance);
             let trace = FailureTrace {
                 name: codes::UNFINISHED.name.to_owned(),

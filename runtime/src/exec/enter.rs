@@ -203,13 +203,13 @@ impl<'p> Executor<'p, '_> {
         let limit = self.duration(limit, "the limit of `within`")?;
         let since = self.backend.value(since, self.out)?;
         if since.is_some_and(|s| !s.is_finite()) {
-            return Err(self.unusable("`within` refers to a time that has not come yet".to_owned()));
+            return Err(self.unusable("`within` refers to a time that is not known yet".to_owned()));
         }
         let rounding = 1e-9 * self.state.now.abs().max(1.0);
         match limit.zip(since) {
             Some((limit, since)) if self.state.now - since > limit + rounding => {
                 let [passed, limit] = [self.state.now - since, limit].map(show_number);
-                let text = format!("{passed} s have passed, at most {limit} s may");
+                let text = format!("{passed} s have passed, but at most {limit} s are allowed");
                 self.fail(id, Raised::named("late", text));
             }
             _ => {

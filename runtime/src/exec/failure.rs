@@ -130,7 +130,7 @@ pub fn diagnostic(trace: &FailureTrace) -> Diagnostic {
         // A block has no name of its own: the step it belongs to says where.
         if step.span != last && !step.span.is_empty() && step.label != "sequence" {
             let since = show_number(step.started);
-            diagnostic = diagnostic.because(step.span, format!("in `{}`, begun at {since} s", step.label));
+            diagnostic = diagnostic.because(step.span, format!("in `{}`, started at {since} s", step.label));
             last = step.span;
         }
     }
@@ -140,7 +140,7 @@ pub fn diagnostic(trace: &FailureTrace) -> Diagnostic {
 
 /// A failed expectation as a diagnostic.
 pub fn expectation_diagnostic(result: &ExpectationResult) -> Diagnostic {
-    let headline = format!("`{}` does not hold at {} s", result.text, show_number(result.time));
+    let headline = format!("`{}` is false at {} s", result.text, show_number(result.time));
     let measured: Vec<String> = result.compared.iter().map(Measured::show).filter(|t| !t.is_empty()).collect();
     let label = if measured.is_empty() { "expected here".to_owned() } else { measured.join(", ") };
     Diagnostic::error(codes::EXPECTATION_FAILED, result.span, headline, label)

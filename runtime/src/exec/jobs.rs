@@ -13,7 +13,7 @@ impl<'p> Executor<'p, '_> {
     pub(super) fn begin_job(&mut self, id: FrameId, name: &'p str, body: StepId) {
         let scope = self.ancestors(id).find(|f| self.is_scope(*f)).unwrap_or(0);
         if self.find_job(id, name).is_some_and(|(_, job)| job.end.is_none()) {
-            return self.fail(id, Raised::named("job", format!("the job `{name}` is still running")));
+            return self.fail(id, Raised::named("job", format!("job `{name}` is still running")));
         }
         let frame = self.insert(Some(scope), Some(body));
         if let Some(new) = self.state.frames.get_mut(&frame) {
@@ -71,7 +71,7 @@ impl<'p> Executor<'p, '_> {
             }
             // Its block has waited for it.
             None if self.state.job_names.contains(name) => self.push_end(id, End::Done),
-            None => self.fail(id, Raised::named("job", format!("no job `{name}` has been started"))),
+            None => self.fail(id, Raised::named("job", format!("job `{name}` has not been started"))),
         }
     }
 

@@ -115,7 +115,7 @@ impl Executor<'_, '_> {
         if value.fract() == 0.0 && (0.0..=MAX_COUNT).contains(&value) {
             return Ok(value as u64);
         }
-        Err(self.unusable(format!("{what} is {}, which is not a whole number of times", show_number(value))))
+        Err(self.unusable(format!("{what} is {}, but must be a whole number", show_number(value))))
     }
 
     /// A number of the plan that cannot be used.

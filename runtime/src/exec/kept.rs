@@ -40,7 +40,7 @@ impl Executor<'_, '_> {
         let Some(limit) = self.plan.limits.get(index as usize) else { return };
         let (condition, thing) = (&limit.condition, self.instance(limit.instance).to_owned());
         let label = self.label(id).to_owned();
-        let text = format!("`{}` of `{thing}` is broken during `{label}`", condition.text);
+        let text = format!("`{}` of `{thing}` becomes false during `{label}`", condition.text);
         let raised = self.unmet(condition, condition.failure(), condition.code(), text);
         self.fail(id, Raised { help: condition.advice(), ..raised });
     }

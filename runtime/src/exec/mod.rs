@@ -350,7 +350,7 @@ impl<'p> Executor<'p, '_> {
 
     fn give_up_instant(&mut self) {
         self.state.taken = 0;
-        let message = format!("more than {} steps are taken within one instant", self.limits.steps_per_instant);
+        let message = format!("the run takes more than {} steps at one instant", self.limits.steps_per_instant);
         let fault = self.run_fault(codes::ENDLESS_INSTANT, message);
         self.fault_everywhere(fault);
     }

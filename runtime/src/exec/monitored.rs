@@ -31,7 +31,7 @@ impl Executor<'_, '_> {
         for (index, condition) in kept.iter().enumerate() {
             let Some(follower) = self.follower(step, condition) else { continue };
             if !from_start && !self.follower_holds(&follower)? {
-                let text = format!("`{}` does not hold at the start", condition.text);
+                let text = format!("`{}` is false at the start", condition.text);
                 let raised = self.unmet(condition, "broken", codes::RUN_FAILED, text);
                 self.fail(id, raised);
                 return Ok(());
@@ -48,7 +48,7 @@ impl Executor<'_, '_> {
         for need in needs {
             if !self.judge(step, need)? {
                 let label = &self.plan.get(step).label;
-                let text = format!("`{label}` needs `{}`, which does not hold", need.text);
+                let text = format!("`{label}` needs `{}`, which is false", need.text);
                 let raised = self.refused(need, label, text);
                 self.fail(id, raised);
                 return Ok(false);
@@ -62,9 +62,7 @@ impl Executor<'_, '_> {
         let raised = self.unmet(condition, condition.failure(), condition.code(), text);
         let raised = Raised { help: condition.advice(), ..raised };
         match self.said(condition) {
-            Some(words) => {
-                Raised { text: format!("`{label}` cannot be done: {words}"), measured: Vec::new(), ..raised }
-            }
+            Some(words) => Raised { text: format!("`{label}` failed: {words}"), measured: Vec::new(), ..raised },
             None => raised,
         }
     }
@@ -79,7 +77,7 @@ impl Executor<'_, '_> {
 
     /// What a breach of an invariant raises.
     pub(super) fn broken(&mut self, condition: &Condition) -> Raised {
-        let text = format!("`{}` no longer holds", condition.text);
+        let text = format!("`{}` became false", condition.text);
         self.unmet(condition, "broken", codes::RUN_FAILED, text)
     }
 
@@ -118,7 +116,7 @@ impl Executor<'_, '_> {
         let label = &self.plan.get(step).label;
         for promise in promises {
             if !self.judge(step, promise)? {
-                let text = format!("`{label}` promises `{}`, which does not hold at its end", promise.text);
+                let text = format!("`{label}` does not achieve its effect: `{}` is false at its end", promise.text);
                 return Ok(Some(self.unmet(promise, "promise", codes::PROMISE_BROKEN, text)));
             }
         }
@@ -131,7 +129,7 @@ impl Executor<'_, '_> {
             return Ok(None);
         }
         let [took, low, high] = [took, low, high].map(show_number);
-        let text = format!("`{label}` took {took} s and promises {low} s .. {high} s");
+        let text = format!("`{label}` took {took} s, outside its bounds {low} s .. {high} s");
         Ok(Some(Raised { code: codes::PROMISE_BROKEN, ..Raised::named("promise", text) }))
     }
 

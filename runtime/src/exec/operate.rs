@@ -53,7 +53,7 @@ impl<'p> Executor<'p, '_> {
             // Who says no wants it to end; what leaves things as they should be goes on all the same.
             Some(yes) if yes || finally => {
                 if !yes {
-                    self.decline(id, "a question was answered with no".to_owned());
+                    self.decline(id, "a person answered no".to_owned());
                 }
                 self.set_kind(id, Kind::Pass);
                 self.push_end(id, End::Done);
@@ -136,7 +136,7 @@ impl<'p> Executor<'p, '_> {
         operation.claims.iter().find_map(|&instance| {
             let name = self.instance(instance);
             if let Some(holder) = self.state.claims.foreign_holder(instance, &within) {
-                return Some(format!("`{own}` uses `{name}` while `{}` holds it", self.label(holder)));
+                return Some(format!("`{own}` uses `{name}` while `{}` has claimed it", self.label(holder)));
             }
             let exclusive = self.state.claims.own_holder(instance, &within);
             let independent = |u: &Use| match &self.plan.get(u.step).step {
@@ -254,7 +254,7 @@ impl<'p> Executor<'p, '_> {
             }
             if holds == Some(false) {
                 let label = self.label(id).to_owned();
-                let text = format!("`{label}` does not keep `{}`", limit.text);
+                let text = format!("`{label}` makes `{}` false", limit.text);
                 let raised = self.refused(limit, &label, text);
                 self.fail(id, raised);
                 return Ok(false);
@@ -299,16 +299,19 @@ impl<'p> Executor<'p, '_> {
         let claims = self.state.claims.waiting().iter().filter_map(|request| {
             let (instance, holder) = self.state.claims.blocker(request)?;
             let (waiter, holder, name) = (self.label(request.frame), self.label(holder), self.instance(instance));
-            Some(format!("`{waiter}` waits for `{name}`, which `{holder}` has"))
+            Some(format!("`{waiter}` waits for `{name}`, which `{holder}` has claimed"))
         });
         let jobs = self.state.frames.iter().filter_map(|(&id, f)| match f.kind {
             Kind::Await { .. } => {
                 let Step::Await { job } = &self.plan.get(f.step?).step else { return None };
-                Some(format!("`{}` waits for the job `{job}`", self.label(id)))
+                Some(format!("`{}` waits for job `{job}`", self.label(id)))
             }
             _ => None,
         });
         let all: Vec<String> = claims.chain(jobs).collect();
-        format!("nothing can go on any more: {}", if all.is_empty() { "no step waits".into() } else { all.join("; ") })
+        format!(
+            "all steps wait for each other: {}",
+            if all.is_empty() { "no step is running".into() } else { all.join("; ") }
+        )
     }
 }

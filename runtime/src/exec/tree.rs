@@ -20,7 +20,7 @@ pub(super) fn check(plan: &Plan) -> Result<(), String> {
     while let Some(step) = open.pop() {
         match seen.get_mut(step.0 as usize) {
             None => return Err(format!("the plan has no step {}", step.0)),
-            Some(true) => return Err(format!("step {} of the plan stands in two places", step.0)),
+            Some(true) => return Err(format!("step {} of the plan is in two places", step.0)),
             Some(slot) => *slot = true,
         }
         open.extend(plan.get(step).step.children());

@@ -108,7 +108,7 @@ impl Executor<'_, '_> {
         if self.state.taken > self.limits.steps_per_instant {
             self.state.taken = 0;
             let limit = self.limits.steps_per_instant;
-            let message = format!("more than {limit} steps are taken within one instant");
+            let message = format!("the run takes more than {limit} steps at one instant");
             return Err(self.run_fault(codes::ENDLESS_INSTANT, message));
         }
         let recordings = self.state.recordings.values().map(super::Recording::due).fold(f64::INFINITY, f64::min);
@@ -144,7 +144,7 @@ impl Executor<'_, '_> {
             return Ok(Fired::new());
         }
         let mut fault = self.run_fault(codes::DEADLOCK, self.standstill());
-        fault.help.push("claim everything that is needed together in one `claim`, or in the same order".to_owned());
+        fault.help.push("claim all of them in one `claim`, or in the same order everywhere".to_owned());
         Err(fault)
     }
 
@@ -164,8 +164,8 @@ impl Executor<'_, '_> {
             span = span.or(condition.map(|c| c.span)).or(Some(node.span));
             what = what.or(condition.map(|c| format!("`{}`", c.text))).or(Some(format!("`{}`", node.label)));
         }
-        let what = what.unwrap_or_else(|| "the run".to_owned());
-        let message = format!("{what} is still waited for after {days} days of lab time");
+        let what = what.unwrap_or_else(|| "its end".to_owned());
+        let message = format!("the run still waits for {what} after {days} days of lab time");
         Fault { span, ..Fault::new(codes::WAITS_FOR_EVER, self.state.now, message).help("give it a `timeout`") }
     }
 
@@ -274,10 +274,10 @@ impl Executor<'_, '_> {
         });
         let raised = match condition {
             Some(c) => {
-                let text = format!("`{}` was waited for in vain for {waited} s", c.text);
+                let text = format!("`{}` did not become true within {waited} s", c.text);
                 self.unmet(c, "timeout", codes::RUN_FAILED, text)
             }
-            None => Raised::named("timeout", format!("waited in vain for {waited} s")),
+            None => Raised::named("timeout", format!("still not done after {waited} s")),
         };
         self.fail(id, raised);
     }

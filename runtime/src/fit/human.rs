@@ -27,13 +27,14 @@ pub fn human(o: &Outcome) -> String {
     let freedom = o.degrees_of_freedom;
     match (o.learnt_noise, o.chi2_per_degree) {
         (Some(noise), _) => {
-            let _ = writeln!(out, "  noise learnt from the residuals: {} ({freedom} degrees of freedom)", short(noise));
+            let _ =
+                writeln!(out, "  noise estimated from the residuals: {} ({freedom} degrees of freedom)", short(noise));
         }
         (None, Some(v)) => {
             let _ = writeln!(out, "  chi2 per degree of freedom: {} ({freedom} of them)", short(v));
         }
         (None, None) => {
-            let _ = writeln!(out, "  as many parameters as values: nothing is left over to judge the model by");
+            let _ = writeln!(out, "  as many parameters as values: no residuals are left to judge the model");
         }
     }
     for (i, row) in o.correlation.iter().enumerate() {

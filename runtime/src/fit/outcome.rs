@@ -119,13 +119,13 @@ impl Outcome {
             && v > 1.0 + 4.0 * (2.0 / freedom as f64).sqrt()
         {
             notes.push(
-                "the residuals are larger than the noise says: the model lacks something, or the noise is larger"
+                "the residuals are larger than the noise: the model is incomplete, or the noise is underestimated"
                     .into(),
             );
         }
         if solution.agreed < solution.starts {
             let (agreed, starts) = (solution.agreed, solution.starts);
-            notes.push(format!("only {agreed} of {starts} starts led to this place: there may be a better one"));
+            notes.push(format!("only {agreed} of {starts} starts reached this minimum: there may be a better one"));
         }
         Outcome {
             fit: fit.name.clone(),
@@ -204,9 +204,9 @@ fn notes(estimates: &[Estimate], undetermined: &[Vec<String>], spread: &Spread) 
     for group in undetermined {
         let names: Vec<String> = group.iter().map(|n| format!("`{n}`")).collect();
         out.push(match names.as_slice() {
-            [one] => format!("the data do not determine {one}: anywhere in its range the fit is about as good"),
+            [one] => format!("the data do not determine {one}: the fit is about as good anywhere in its range"),
             many => format!(
-                "the data do not determine {} each by itself: they can change together and the fit stays as good",
+                "the data do not determine {} separately: if they change together, the fit stays as good",
                 many.join(" and ")
             ),
         });
@@ -216,7 +216,7 @@ fn notes(estimates: &[Estimate], undetermined: &[Vec<String>], spread: &Spread) 
             let (which, value) = if end == "low" { ("lower", e.low) } else { ("upper", e.high) };
             let value = crate::study::short(value);
             out.push(format!(
-                "`{}` lies at the {which} end of its range, {value} {}: its error means little",
+                "`{}` is at the {which} end of its range, {value} {}: its error means little",
                 e.name, e.unit
             ));
         }
@@ -226,7 +226,10 @@ fn notes(estimates: &[Estimate], undetermined: &[Vec<String>], spread: &Spread) 
             if let Some(r) = r.filter(|r| r.abs() > CLOSE)
                 && let (Some(a), Some(b)) = (estimates.get(i), estimates.get(j))
             {
-                out.push(format!("`{}` and `{}` are hardly told apart: their correlation is {r:.4}", a.name, b.name));
+                out.push(format!(
+                    "the data hardly separate `{}` and `{}`: their correlation is {r:.4}",
+                    a.name, b.name
+                ));
             }
         }
     }

@@ -73,7 +73,7 @@ impl<'p> Runs<'p> {
             let number = self.times.partition_point(|t| *t < row.time);
             let Some(values) = seen.0.get(&number) else {
                 let (end, at) = (outcome.end_time, row.time);
-                return Err(format!("the run ends at {end} s, before the data at {at} s"));
+                return Err(format!("the run ends at {end} s, but the data continue to {at} s"));
             };
             out.push(values.clone());
         }

@@ -104,11 +104,11 @@ pub fn solve(
     let costs: Vec<f64> = ends.iter().map(|e| e.as_ref().map_or(f64::INFINITY, |e| e.0)).collect();
     let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
     let Some(places) = ends.into_iter().flatten().find(|e| e.0 == best).map(|e| e.1) else {
-        return Err(Unsolved::Failed("no start led anywhere".to_string()));
+        return Err(Unsolved::Failed("no start reached a minimum".to_string()));
     };
     let residuals = counted.residuals(&places).map_err(Unsolved::Failed)?;
     let Some(jacobian) = counted.jacobian(&places, &residuals) else {
-        return Err(Unsolved::Failed("the response beside the best place cannot be computed".to_string()));
+        return Err(Unsolved::Failed("the response near the best fit cannot be computed".to_string()));
     };
     Ok(Solution {
         values: counted.values(&places),

@@ -87,9 +87,7 @@ fn drawn(program: &Program, thing: InstanceId, by: Perturbation, seed: u64) -> R
         }
     }
     let name = &scene.get(thing).name;
-    Err(format!(
-        "`{name}` has no room: no place so near to its own keeps it on what it stands on and clear of the rest"
-    ))
+    Err(format!("`{name}` has no room: no place near its own keeps it on its support and clear of other things"))
 }
 
 /// The flat top that a loose thing stands on.

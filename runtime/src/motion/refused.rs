@@ -81,35 +81,35 @@ impl Refused {
         let name = &scene.get(mover).name;
         match self {
             Refused::NoRobot => format!("`{name}` has no joints to move with"),
-            Refused::NoFrame => format!("`{name}` is sent to a frame that nothing gives a place"),
+            Refused::NoFrame => format!("the target frame of `{name}` has no position"),
             Refused::OutOfReach(far, _) => format!("`{name}` stays {:.0} mm short of it", far * 1e3),
-            Refused::Collides(m) => format!("`{}` of `{name}` runs into {} at {}", m.mine, m.whom(), m.place()),
+            Refused::Collides(m) => format!("`{}` of `{name}` collides with {} at {}", m.mine, m.whom(), m.place()),
             Refused::Swings(item, m) => {
-                format!("`{}` of `{}` runs into {} at {}", m.mine, scene.get(*item).name, m.whom(), m.place())
+                format!("`{}` of `{}` collides with {} at {}", m.mine, scene.get(*item).name, m.whom(), m.place())
             }
-            Refused::NoWay => format!("no way was found for `{name}`"),
-            Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
+            Refused::NoWay => format!("`{name}` has no collision-free path"),
+            Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from its target", far * 1e3),
             Refused::Bound(item, other) => {
                 let (item, other) = (&scene.get(*item).name, &scene.get(*other).name);
                 format!("`{name}` and `{other}` both hold `{item}`")
             }
-            Refused::StandsOn => format!("`{name}` stands on what it is to grip"),
-            Refused::Fixed => format!("`{name}` has no base that drives"),
-            Refused::NotHeld => format!("`{name}` holds nothing like that"),
+            Refused::StandsOn => format!("`{name}` stands on the thing that it should grip"),
+            Refused::Fixed => format!("`{name}` has no mobile base"),
+            Refused::NotHeld => format!("`{name}` does not hold that thing"),
             Refused::TooWide(width, opening) => {
-                format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
+                format!("the fingers of `{name}` open {:.0} mm, but {:.0} mm are needed", opening * 1e3, width * 1e3)
             }
-            Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
+            Refused::Tilted(by) => format!("the load of `{name}` would tilt by {:.0} deg", by.to_degrees()),
             Refused::Slips(item, borne) => {
                 let item = &scene.get(*item).name;
-                format!("the fingers of `{name}` bear {:.2} of the weight of `{item}`", borne / GRAVITY)
+                format!("the fingers of `{name}` can hold only {:.2} of the weight of `{item}`", borne / GRAVITY)
             }
             Refused::Spills(item, lost) => {
                 let item = &scene.get(*item).name;
-                format!("`{name}` tilts `{item}` so far that {:.1} mL run out", lost * 1e6)
+                format!("`{name}` tilts `{item}` so far that {:.1} mL spill", lost * 1e6)
             }
             Refused::Joints(given, there) => format!("{given} positions are given for {there} joints of `{name}`"),
-            Refused::Beyond(joint) => format!("`{joint}` of `{name}` does not get there"),
+            Refused::Beyond(joint) => format!("joint `{joint}` of `{name}` cannot reach that position"),
         }
     }
 }

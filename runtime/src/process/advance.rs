@@ -174,7 +174,7 @@ impl Engine<'_> {
             Some(Ending::Unseen(node)) => return Err(self.restless(Some(node))),
             Some(Ending::Drained(_, which)) => {
                 let drained: &Drained = &self.model.temperatures.drained[which];
-                return Err(self.overdrawn(drained, "is used up"));
+                return Err(self.overdrawn(drained, "has run out"));
             }
             Some(Ending::Crossed(_)) | None => {}
         }

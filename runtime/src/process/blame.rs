@@ -62,7 +62,7 @@ impl<'m> Engine<'m> {
 
     /// The fault of a transfer of a share that is no finite number.
     pub(super) fn no_share(&self, fraction: NodeId, who: Option<&str>, span: Span) -> Fault {
-        let headline = "the share that is transferred has no finite value".to_owned();
+        let headline = "the transferred fraction has no finite value".to_owned();
         let fault = self.without_value(headline, fraction, who, span);
         Fault { code: codes::TRANSFER_FRACTION, ..fault }.help("is the source empty?")
     }
@@ -152,13 +152,13 @@ impl<'m> Engine<'m> {
             self.eval(d.rate).abs() / (value.abs() + state.scale.unwrap_or(self.sizes[d.state as usize]).abs())
         };
         let Some(fastest) = rates.max_by(|a, b| pace(a).total_cmp(&pace(b))) else {
-            return Fault::new(codes::INTEGRATION_FAILED, self.time, "no step is short enough");
+            return Fault::new(codes::INTEGRATION_FAILED, self.time, "the integrator finds no step short enough");
         };
         if !self.eval(fastest.rate).is_finite() {
             return self.no_rate(fastest.state);
         }
         let state = &self.model.states[fastest.state as usize];
-        let message = format!("`{}` changes faster than any step can follow", state.name);
+        let message = format!("`{}` changes too fast for the integrator", state.name);
         let most = |terms: &[Contribution]| {
             let size = |t: &&Contribution| self.gives(t).abs();
             terms.iter().max_by(|a, b| size(a).total_cmp(&size(b))).filter(|t| size(t) > 0.0).copied()
@@ -166,7 +166,7 @@ impl<'m> Engine<'m> {
         let fault = |message| Fault::new(codes::INTEGRATION_FAILED, self.time, message);
         match self.innermost(&fastest.terms, most) {
             Some((term, _)) => {
-                let message = format!("{message}: most of it is by `{}`", self.law_of(&term));
+                let message = format!("{message}, mostly because of `{}`", self.law_of(&term));
                 self.with_running(fault(message).at(term.span))
             }
             None => self.with_running(fault(message).at(state.span)),
@@ -195,9 +195,9 @@ impl<'m> Engine<'m> {
     pub(super) fn restless(&self, node: Option<NodeId>) -> Fault {
         let place = node.and_then(|node| self.user_of(node));
         let name = place.map_or("a law".to_owned(), |(name, _)| format!("`{name}`"));
-        let message = format!("{name} changes with the time more often than a run can follow");
+        let message = format!("{name} changes with time more often than a run can follow");
         let fault = Fault::new(codes::INTEGRATION_FAILED, self.time, message)
-            .help("give it a longer period, or write its mean over the time");
+            .help("give it a longer period, or use its mean over time");
         match place {
             Some((_, span)) => fault.at(span),
             None => fault,
@@ -238,11 +238,11 @@ impl<'m> Engine<'m> {
         let did = |d: &&Doubt| self.state(d.state).abs();
         let culprit = balance.doubts.iter().max_by(|a, b| did(a).total_cmp(&did(b))).filter(|d| did(d) > 0.0);
         let process = culprit.and_then(|d| Some((d.process, self.model.processes.get(d.process as usize)?, did(&d))));
-        let sums = format!("there is {}, and {} is accounted for", unit.show(report.now), unit.show(accounted));
+        let sums = format!("the lab holds {}, but {} is accounted for", unit.show(report.now), unit.show(accounted));
         let (message, span) = match process {
             Some((_, process, by)) => {
                 let verb = if report.error > 0.0 { "made" } else { "lost" };
-                let text = format!("`{}` has {verb} {} of {}: {sums}", process.name, unit.show(by), report.name);
+                let text = format!("`{}` {verb} {} of {}: {sums}", process.name, unit.show(by), report.name);
                 (text, Some(process.span))
             }
             None => (format!("the balance of {} does not close: {sums}", report.name), cause),
@@ -250,7 +250,7 @@ impl<'m> Engine<'m> {
         let mut fault = Fault::new(codes::BALANCE_BREACH, self.time, message);
         fault.span = span;
         for (at, by) in process.map_or_else(Vec::new, |(index, ..)| self.lines_of(index, balance)) {
-            let verb = if by > 0.0 { "adds" } else { "takes" };
+            let verb = if by > 0.0 { "adds" } else { "removes" };
             fault = fault.because(at, format!("{verb} {} per s now", unit.show(by.abs())));
         }
         fault.help(format!("the difference is {}", unit.show(report.error)))

@@ -78,7 +78,7 @@ impl Engine<'_> {
         let message = format!("`{}` happens more than {count} times at one instant", event.name);
         Fault::new(codes::EVENT_CASCADE, self.time, message)
             .at(event.span)
-            .help("events that make each other's condition true never come to rest")
+            .help("these events make each other's condition true endlessly")
     }
 
     fn report_processes(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
@@ -153,16 +153,18 @@ impl Engine<'_> {
             Refusal::Fraction(fraction) => {
                 let shown = matterix_ir::quantity::show_number;
                 let message = match fraction {
-                    1.0..1.01 => format!("the transfer takes {} % more than there is", shown(100.0 * (fraction - 1.0))),
-                    _ => format!("the transfer takes {} times what there is", shown(fraction)),
+                    1.0..1.01 => {
+                        format!("the transfer removes {} % more than the source holds", shown(100.0 * (fraction - 1.0)))
+                    }
+                    _ => format!("the transfer removes {} times the contents of the source", shown(fraction)),
                 };
                 let help =
-                    if fraction > 1.0 { "more is asked for than the source holds" } else { "is the source empty?" };
+                    if fraction > 1.0 { "transfer less, or fill the source first" } else { "is the source empty?" };
                 Fault::new(codes::TRANSFER_FRACTION, self.time, message).help(help)
             }
             Refusal::NoPlace(key, state) => {
                 let name = &self.model.states[state as usize].name;
-                let message = format!("`{name}` would be lost: the destination has no place for `{key}`");
+                let message = format!("`{name}` would be lost: the target has no `{key}`");
                 Fault::new(codes::BALANCE_BREACH, self.time, message)
             }
         }

@@ -80,10 +80,10 @@ impl Engine<'_> {
     /// The fault of an amount that a law takes more of than there is.
     pub(super) fn overdrawn(&self, drained: &Drained, how: &str) -> Fault {
         let name = &self.model.states[drained.state as usize].name;
-        let message = format!("`{}` takes more than there is: `{name}` {how}", drained.law);
+        let message = format!("`{}` removes more than `{name}` holds: it {how}", drained.law);
         Fault::new(codes::TRANSFER_FRACTION, self.time, message)
             .at(drained.span)
-            .help("let the rate follow what is left, or give the law a `while` that ends it")
+            .help("let the rate depend on the remaining amount, or give the law a `while` that ends it")
     }
 
     /// Fails where what was assigned since the last look makes or loses something; `who` did it.
@@ -96,7 +96,7 @@ impl Engine<'_> {
             let verb = if sum > 0.0 { "makes" } else { "loses" };
             let message = format!("{who} {verb} {} of {}", balance.unit.show(sum.abs()), balance.name);
             let fault = Fault::new(codes::BALANCE_BREACH, self.time, message)
-                .help("let one mixture gain what another loses: `move(...)` does");
+                .help("add to one mixture the amount that another loses, as `move(...)` does");
             return Err(match span {
                 Some(span) => fault.at(span),
                 None => fault,
@@ -169,9 +169,9 @@ impl Engine<'_> {
             let unit = matterix_ir::Unit { symbol: "degC".into(), factor: 1.0, offset: 273.15 };
             let shown = |t: f64| unit.show(t);
             let message = match t < 0.0 || t.is_nan() {
-                true => format!("`{}` brings `{}` to {}, which cannot be", suspect.law, suspect.name, shown(t)),
+                true => format!("`{}` drives `{}` to {}, which is impossible", suspect.law, suspect.name, shown(t)),
                 false => format!(
-                    "`{}` brings `{}` to {}: all else in the lab was within {} and {}",
+                    "`{}` drives `{}` to {}, but everything else in the lab was between {} and {}",
                     suspect.law,
                     suspect.name,
                     shown(t),
@@ -181,7 +181,7 @@ impl Engine<'_> {
             };
             return Err(Fault::new(codes::NONPHYSICAL_TEMPERATURE, self.time, message)
                 .at(suspect.span)
-                .help("let amounts take their heat along: `move(...)` does"));
+                .help("let amounts carry their heat, as `move(...)` does"));
         }
         Ok(())
     }

@@ -54,7 +54,7 @@ impl Engine<'_> {
     /// The fault of a rate that rests on a condition which an operation leaves neither true nor false.
     fn undecided_rate(&self, state: u32, operation: NodeId) -> Fault {
         let name = &self.model.states[state as usize].name;
-        let headline = format!("a condition that the rate of `{name}` rests on has no value");
+        let headline = format!("a condition in the rate of `{name}` has no value");
         let (law, span) = self.user_of(operation).unwrap_or((name, self.model.states[state as usize].span));
         self.without_value(headline, operation, Some(law), span)
     }

@@ -14,13 +14,13 @@ impl Engine<'_> {
     pub(super) fn why(&self, operation: NodeId) -> String {
         let text = match self.model.graph.op(operation) {
             Op::Binary(BinaryOp::Div, _, b) if self.eval(b) == 0.0 => "a division by zero",
-            Op::Unary(UnaryOp::Ln, _) => "the logarithm of a number that is not positive",
+            Op::Unary(UnaryOp::Ln, _) => "the logarithm of 0 or of a negative number",
             Op::Unary(UnaryOp::Sqrt, _) => "the square root of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) < 0.0 => "a power of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) == 0.0 => "a division by zero",
             Op::Solved(..) => return undefined::why(&self.model.graph, operation),
-            Op::Select(..) => "a table that is read beyond its first or last point",
-            Op::Local(_) | Op::Reading(_) => "it depends on a value that is not set yet",
+            Op::Select(..) => "a table that is read outside its first and last point",
+            Op::Local(_) | Op::Reading(_) => "a value that is not set yet",
             _ => "a number too large",
         };
         text.into()

@@ -61,14 +61,14 @@ fn facts(schedule: &Schedule) -> Vec<String> {
     let s = |t: f64| format!("{} s", show_number((t * 1000.0).round() / 1000.0));
     let mut facts = vec![s(schedule.makespan)];
     facts.push(if schedule.optimal {
-        "the shortest there is".to_owned()
+        "the shortest possible".to_owned()
     } else {
-        format!("not proven to be the shortest; none is shorter than {}", s(schedule.bound))
+        format!("not proven to be the shortest; the lower bound is {}", s(schedule.bound))
     });
     let list = schedule.list.filter(|list| *list > schedule.makespan);
     facts.extend(list.map(|list| format!("list schedule {}", s(list))));
     if schedule.trial {
-        facts.push("durations that follow from the model are those of a trial run".to_owned());
+        facts.push("durations that depend on the model come from a trial run".to_owned());
     }
     facts
 }

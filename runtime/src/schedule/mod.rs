@@ -156,10 +156,10 @@ fn pose(program: &Program, options: &Options<'_>) -> Result<(Problem, bool), Box
             let mut d = match failure {
                 Some(failure) => diagnostic(&failure),
                 None => {
-                    Diagnostic::error(codes::RUN_FAILED, plan.get(plan.root).span, "the trial run was ended", "here")
+                    Diagnostic::error(codes::RUN_FAILED, plan.get(plan.root).span, "the trial run was stopped", "here")
                 }
             };
-            d.help.push("a schedule needs times that only a run can tell, and the trial run failed here".to_owned());
+            d.help.push("a schedule needs durations from a trial run, which failed here".to_owned());
             Box::new(d)
         })?;
         return match unroll::unroll(plan, &known, Some(&trace)) {
@@ -175,14 +175,14 @@ fn unknown(program: &Program, open: &Open) -> Box<Diagnostic> {
     Box::new(match open {
         Open::Unknown(step) => {
             let node = plan.get(*step);
-            let headline = format!("how long `{}` takes is not known before a run", node.label);
-            Diagnostic::error(codes::UNSCHEDULABLE, node.span, headline, "takes as long as it takes")
-                .help("give its times as constants, parameters or times of named steps")
+            let headline = format!("the duration of `{}` is unknown before a run", node.label);
+            Diagnostic::error(codes::UNSCHEDULABLE, node.span, headline, "unknown duration")
+                .help("write its duration with constants, parameters or times of named steps")
         }
         Open::TooLong => {
             let node = plan.get(plan.root);
             let headline = "the workflow has too many steps to be scheduled";
-            Diagnostic::error(codes::UNSCHEDULABLE, node.span, headline, "loops are written out")
+            Diagnostic::error(codes::UNSCHEDULABLE, node.span, headline, "loops are expanded")
         }
     })
 }
@@ -192,12 +192,12 @@ fn unmeetable(program: &Program, proven: bool) -> Box<Diagnostic> {
     let name = &plan.workflow;
     let (headline, help) = if proven {
         (
-            format!("no schedule of `{name}` keeps all its windows"),
-            "allow more time in a `within` or `timeout`, or claim less at once and for shorter",
+            format!("no schedule of `{name}` keeps all of its time windows"),
+            "allow more time in a `within` or `timeout`, or claim fewer things for a shorter time",
         )
     } else {
         (
-            format!("no schedule of `{name}` that keeps all its windows was found in the time given"),
+            format!("the search found no schedule of `{name}` in its time limit"),
             "give the search a longer `--time-limit`, or allow more time in a `within`",
         )
     };
@@ -312,18 +312,18 @@ impl Schedule {
             let found = program.scene.instances.iter().position(|i| i.name == *name);
             found
                 .map(|i| InstanceId(i as u32))
-                .ok_or_else(|| format!("the schedule names `{name}`, which the lab has not"))
+                .ok_or_else(|| format!("the schedule contains `{name}`, but the lab does not"))
         };
         let claims = |step: StepId| {
             let node = program.plan.steps.get(step.0 as usize).map(|s| &s.step);
             matches!(node, Some(matterix_ir::plan::Step::Claim { .. }))
         };
         if self.schema != SCHEMA {
-            return Err(format!("the schedule has schema {}, this is {SCHEMA}", self.schema));
+            return Err(format!("the schedule has schema {}, but this program reads {SCHEMA}", self.schema));
         }
         let same = self.workflow == program.plan.workflow && self.arguments == program.plan.arguments;
         if !same || !self.blocks.iter().all(|b| claims(b.step)) {
-            return Err("the schedule is one of another workflow, or of other parameters".to_owned());
+            return Err("the schedule belongs to another workflow, or to other parameters".to_owned());
         }
         self.blocks
             .iter()

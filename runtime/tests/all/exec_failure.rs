@@ -23,7 +23,7 @@ fn an_unhandled_failure_ends_the_run_with_its_trace() {
     assert_eq!(shown.headline, "the run failed with `slip`: on purpose");
     assert_eq!(shown.span(), lab.program.plan.get(fail).span);
     assert_eq!(shown.labels.len(), 4);
-    assert_eq!(shown.labels[2].text, "in `Skill`, begun at 0 s");
+    assert_eq!(shown.labels[2].text, "in `Skill`, started at 0 s");
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn an_operations_unmet_need_shows_the_condition() {
     let run = lab.run(root);
     assert_eq!(run.failed(), "need");
     assert!(run.log.operations.is_empty());
-    assert_eq!(run.failure().text, "`heat` needs `false`, which does not hold");
+    assert_eq!(run.failure().text, "`heat` needs `false`, which is false");
 }
 
 #[test]
@@ -274,7 +274,7 @@ fn retry_reaches_its_handler_from_any_depth() {
     let run = lab.run(root);
     assert_eq!((run.failed(), run.notes().as_str()), ("slip", "try@0 finally@0 try@0 finally@0"));
     let stray = lab.retry(1.0);
-    assert_eq!(lab.run(stray).failure().text, "`retry` stands only in a handler");
+    assert_eq!(lab.run(stray).failure().text, "`retry` is only for handlers");
 }
 
 #[test]

@@ -236,7 +236,7 @@ fn skills_check_needs_promises_and_duration() {
     assert_eq!(run.failed(), "need");
     let failure = run.failure();
     assert_eq!(failure.code.name, "need-unmet");
-    assert_eq!(failure.text, "`Skill` needs `a < limit`, which does not hold");
+    assert_eq!(failure.text, "`Skill` needs `a < limit`, which is false");
     assert_eq!(failure.measured[0].value, Some(2.0));
     let nothing = lab.wait(1.0);
     let root = lab.skill(&[], &[promise], nothing);
@@ -246,7 +246,7 @@ fn skills_check_needs_promises_and_duration() {
     let takes = Some(Takes { nominal, bounds: Some((low, high)) });
     let (needs, invariants, promises) = (Vec::new(), Vec::new(), Vec::new());
     let root = lab.step(Step::Skill { verb: "do".into(), needs, invariants, promises, takes, body });
-    assert_eq!(lab.run(root).failure().text, "`Skill` took 7 s and promises 4 s .. 6 s");
+    assert_eq!(lab.run(root).failure().text, "`Skill` took 7 s, outside its bounds 4 s .. 6 s");
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn a_plan_that_is_no_tree_is_refused() {
     let mut lab = Lab::new();
     let twice = lab.note("n");
     let root = lab.seq(&[twice, twice]);
-    assert_eq!(lab.run(root).fault().text, "step 0 of the plan stands in two places");
+    assert_eq!(lab.run(root).fault().text, "step 0 of the plan is in two places");
     let missing = lab.seq(&[matterix_ir::plan::StepId(99)]);
     assert_eq!(lab.run(missing).fault().text, "the plan has no step 99");
 }

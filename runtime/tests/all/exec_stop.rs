@@ -137,7 +137,7 @@ fn waiting_for_ever_is_a_fault_at_the_condition() {
     let run = lab.run(root);
     let fault = run.fault();
     assert_eq!(fault.code.name, "waits-for-ever");
-    assert_eq!(fault.text, "`a >= limit` is still waited for after 30 days of lab time");
+    assert_eq!(fault.text, "the run still waits for `a >= limit` after 30 days of lab time");
     assert_eq!(fault.span.start, 9000);
     assert_eq!(run.state(heater), 0.0);
     assert_eq!(run.outcome.suppressed[0].code.name, "waits-for-ever");

@@ -37,13 +37,7 @@ pub fn actions(server: &mut Server, params: CodeActionParams) -> Option<CodeActi
     if wanted(&CodeActionKind::SOURCE_FIX_ALL) {
         let all = all_fixes(&analysis, analysis.root);
         if let Some(edit) = edit(&places, all.iter().copied()).filter(|_| !all.is_empty()) {
-            out.push(action(
-                "make all corrections that leave no doubt".to_string(),
-                CodeActionKind::SOURCE_FIX_ALL,
-                edit,
-                None,
-                false,
-            ));
+            out.push(action("apply all safe fixes".to_string(), CodeActionKind::SOURCE_FIX_ALL, edit, None, false));
         }
     }
     Some(out)

@@ -69,7 +69,7 @@ pub fn answer(server: &mut Server, request: Request) -> Answer {
             with::<asked::SemanticTokensRangeRequest>(server, request, tokens::range)
         }
         "workspace/textDocumentContent" => content(server, &request.params),
-        method => Err((ErrorCode::MethodNotFound, format!("`{method}` is not known"))),
+        method => Err((ErrorCode::MethodNotFound, format!("unknown method `{method}`"))),
     }
 }
 
@@ -98,7 +98,7 @@ fn refusing<R: asked::Request>(
 fn content(server: &Server, params: &Value) -> Answer {
     let uri = params.get("uri").and_then(Value::as_str).and_then(|uri| uri.parse().ok());
     let text = uri.as_ref().and_then(|uri: &Uri| server.shelf.text(uri));
-    let why = || (ErrorCode::InvalidParams, "there is no such text".to_string());
+    let why = || (ErrorCode::InvalidParams, "unknown document".to_string());
     text.map(|text| json!({ "text": text })).ok_or_else(why)
 }
 

@@ -78,7 +78,7 @@ pub fn renamed(server: &mut Server, params: RenameParams) -> Result<Option<Works
     for places in changes.values() {
         let found = locations(server, &known, places);
         let Some(uri) = found.first().map(|l| l.uri.clone()).filter(|_| found.len() == places.len()) else {
-            return Err("not every file that names it can be found".to_string());
+            return Err("some files that use this name may be missing".to_string());
         };
         let version = server.documents.get(&uri).map(|d| d.version);
         let edit = |l: Location| OneOf::Left(TextEdit { range: l.range, new_text: params.new_name.clone() });

@@ -15,6 +15,6 @@ pub fn options(workflow: Option<String>, lab: Option<String>, set: BTreeMap<Stri
 pub fn bytes(asked: Option<usize>) -> Result<usize, String> {
     match asked.unwrap_or(BYTES) {
         bytes if (1_000..=MOST_BYTES).contains(&bytes) => Ok(bytes),
-        _ => Err(format!("`bytes` goes from 1000 to {MOST_BYTES}")),
+        _ => Err(format!("`bytes` must be from 1000 to {MOST_BYTES}")),
     }
 }

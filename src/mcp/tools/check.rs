@@ -34,9 +34,7 @@ pub struct Check {
 impl Task for Check {
     const NAME: &'static str = "check";
     const TITLE: &'static str = "Check a protocol";
-    const ABOUT: &'static str = "Says what is wrong with a protocol (.mtx) without running it: syntax, names, units, amounts, \
-        overflows, order of operations, tips, chemistry, motions. Each finding has a code, the places that led to it, help, and often \
-        corrections with an `id` for the tool `fix`. Call it after every change.";
+    const ABOUT: &'static str = "Finds faults in a protocol (.mtx) without running it: syntax, names, units, amounts, overflows, order of operations, tips, chemistry, motions. Each finding has a code, the places that led to it, help, and often fixes with an `id` for the tool `fix`. Call it after every change.";
     type Data = Findings;
 
     fn limit(&self) -> Option<u64> {

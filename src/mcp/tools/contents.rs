@@ -55,10 +55,8 @@ pub struct Known {
 
 impl Task for Contents {
     const NAME: &'static str = "contents";
-    const TITLE: &'static str = "Say what is known at each statement";
-    const ABOUT: &'static str = "Says, without running anything, what the checks know after each statement of a workflow: what vessels \
-        hold and their temperature, how devices stand, tips, what hands hold, how much time has passed. With `line` everything that is \
-        known there. Use it to find out why a finding is there.";
+    const TITLE: &'static str = "Show the known state at each statement";
+    const ABOUT: &'static str = "Shows, without a run, the state that the checks know after each statement of a workflow: contents and temperatures of vessels, states of devices, tips, things in grippers, elapsed time. With `line`, everything that is known there. Use it to find the cause of a finding.";
     type Data = Known;
 
     fn limit(&self) -> Option<u64> {
@@ -73,7 +71,7 @@ impl Task for Contents {
         let (findings, mut said) = told(&sources, &judged(named(&sources, found), false));
         let shown = chosen(&known, place, &sources)?;
         if shown.is_empty() {
-            said += "nothing is known: there is no workflow, or none could be followed\n";
+            said += "no state is known: the file has no workflow, or none could be followed\n";
         }
         let (mut workflows, mut left_out, mut taken) = (Vec::new(), Vec::new(), 0);
         for (points, only) in shown {
@@ -100,7 +98,7 @@ fn place(line: Option<usize>, column: Option<usize>) -> Result<Option<Place>, St
         (None, None) => return Ok(None),
         (Some(line), None) => line.to_string(),
         (Some(line), Some(column)) => format!("{line}:{column}"),
-        (None, Some(_)) => return Err("a `column` is one of a `line`".to_string()),
+        (None, Some(_)) => return Err("`column` needs a `line`".to_string()),
     };
     text.parse().map(Some).map_err(|_| "`line` and `column` count from 1".to_string())
 }
@@ -124,7 +122,7 @@ fn chosen<'p>(
                 } else {
                     format!("; the nearest are at {}", near.join(" and "))
                 };
-                missed = missed.or(Some(format!("there is no statement of a workflow at this place{near}")));
+                missed = missed.or(Some(format!("no statement of a workflow is at this place{near}")));
             }
         }
     }

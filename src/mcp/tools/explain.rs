@@ -31,12 +31,12 @@ impl Task for Explain {
     const NAME: &'static str = "explain";
     const TITLE: &'static str = "Explain a code";
     const ABOUT: &'static str =
-        "Explains the code of a finding: what it means, an example with the mistake, and the same example mended.";
+        "Explains the code of a finding: its meaning, an example with the mistake, and the fixed example.";
     type Data = Explained;
 
     fn perform(self, _: &Desk, _: &Arc<AtomicBool>) -> Result<Answer, String> {
         let page = explanation(self.code.as_deref())
-            .map_err(|help| format!("there is no diagnostic code `{}`; {help}", self.code.unwrap_or_default()))?;
+            .map_err(|help| format!("unknown diagnostic code `{}`; {help}", self.code.unwrap_or_default()))?;
         Answer::new(page.clone(), Explained { page })
     }
 }

@@ -79,10 +79,8 @@ pub struct Fixed {
 
 impl Task for FixTask {
     const NAME: &'static str = "fix";
-    const TITLE: &'static str = "Make corrections";
-    const ABOUT: &'static str = "Makes corrections that `check` offers: chosen ones by their ids, or `which: sure` (those that leave no \
-        doubt) or `which: all` (guesses too, to be read afterwards). Returns the new text and what is still wrong with it; writes the \
-        file only with `write: true`.";
+    const TITLE: &'static str = "Apply fixes";
+    const ABOUT: &'static str = "Applies fixes that `check` offers: chosen ones by their ids, or `which: sure` (safe ones only) or `which: all` (guesses too, to be read afterwards). Returns the new text and its remaining findings; writes the file only with `write: true`.";
     const WRITES: bool = true;
     type Data = Fixed;
 
@@ -93,7 +91,7 @@ impl Task for FixTask {
     fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         if self.write && self.path.is_none() {
-            return Err("a `text` is in no file that could be written; give its `path`".to_string());
+            return Err("a `text` has no file to write; give its `path`".to_string());
         }
         let fidelity = self.fidelity.unwrap_or(Fidelity::Motion);
         let Mending { input: mended, done, sources, found } = match (&self.ids, self.which) {
@@ -103,7 +101,7 @@ impl Task for FixTask {
             _ => return Err("give either `ids` or `which`".to_string()),
         };
         if stop.load(Ordering::SeqCst) {
-            return Err("the time ran out before all corrections were checked; nothing was written".to_string());
+            return Err("the time ran out before all fixes were checked; nothing was written".to_string());
         }
         let (left, found) = told(&sources, &judged(named(&sources, found), false));
         let text = String::from_utf8(mended.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;
@@ -135,9 +133,7 @@ fn chosen(input: Input, ids: &[String], fidelity: Fidelity, desk: &Desk) -> Resu
     let asked: BTreeSet<&String> = ids.iter().collect();
     for id in asked {
         let Some((_, fix)) = offered.iter().find(|(name, _)| *name == id) else {
-            return Err(format!(
-                "there is no correction `{id}` of this text as it is now; `check` names those there are"
-            ));
+            return Err(format!("this text has no fix `{id}` now; `check` lists the available ones"));
         };
         fixes.push(*fix);
     }

@@ -44,15 +44,14 @@ pub struct Formatted {
 impl Task for Format {
     const NAME: &'static str = "format";
     const TITLE: &'static str = "Format a protocol";
-    const ABOUT: &'static str = "Writes a protocol in the one style: blanks, indentation, empty lines. Returns the new text; writes the \
-        file only with `write: true`.";
+    const ABOUT: &'static str = "Formats a protocol: blanks, indentation, empty lines. Returns the new text; writes the file only with `write: true`.";
     const WRITES: bool = true;
     type Data = Formatted;
 
     fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         if self.write && self.path.is_none() {
-            return Err("a `text` is in no file that could be written; give its `path`".to_string());
+            return Err("a `text` has no file to write; give its `path`".to_string());
         }
         let text = match pipeline::format(&input) {
             Ok(text) => text,
@@ -70,7 +69,7 @@ impl Task for Format {
         let said = match (written, changed) {
             (true, _) => "formatted\n".to_string(),
             (false, true) => text.clone(),
-            (false, false) => "it is in the style already\n".to_string(),
+            (false, false) => "it is already formatted\n".to_string(),
         };
         Answer::new(said, Formatted { text: Some(text), changed, written, left })
     }

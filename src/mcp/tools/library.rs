@@ -54,19 +54,18 @@ pub struct Shelf {
 impl Task for Library {
     const NAME: &'static str = "library";
     const TITLE: &'static str = "Search the standard library";
-    const ABOUT: &'static str = "Searches the standard library: devices, robots, labware, verbs (skills and commands), species, units, \
-        materials. Gives signatures and documentation of what fits the words, or the text of one module.";
+    const ABOUT: &'static str = "Searches the standard library: devices, robots, labware, verbs (skills and commands), species, units, materials. Returns signatures and documentation of the items that fit the words, or the text of one module.";
     type Data = Shelf;
 
     fn perform(self, _: &Desk, _: &Arc<AtomicBool>) -> Result<Answer, String> {
         let most = self.items.unwrap_or(ITEMS);
         if !(1..=MOST_ITEMS).contains(&most) {
-            return Err(format!("`items` goes from 1 to {MOST_ITEMS}"));
+            return Err(format!("`items` must be from 1 to {MOST_ITEMS}"));
         }
         let module = match &self.module {
             None => None,
             Some(name) => Some(items::module_text(name).ok_or_else(|| {
-                format!("there is no module `{name}` in the library; without arguments this tool lists them")
+                format!("the library has no module `{name}`; without arguments this tool lists them")
             })?),
         };
         let empty = Shelf { items: Vec::new(), modules: Vec::new(), text: None };
@@ -75,7 +74,7 @@ impl Task for Library {
                 let items = items::search(&words, self.module.as_deref(), most);
                 let mut text: String = items.iter().map(Item::told).collect();
                 if items.is_empty() {
-                    text = format!("nothing in the library fits `{words}`\n");
+                    text = format!("no item of the library fits `{words}`\n");
                 }
                 Answer::new(text, Shelf { items, ..empty })
             }

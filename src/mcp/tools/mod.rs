@@ -96,11 +96,10 @@ fn offer<T: Task>() -> Offer {
 
 fn order<T: Task>(arguments: JsonObject) -> Result<Order, String> {
     let given = Value::Object(arguments);
-    let task: T =
-        serde_json::from_value(given).map_err(|e| format!("the arguments of `{}` do not fit: {e}", T::NAME))?;
+    let task: T = serde_json::from_value(given).map_err(|e| format!("wrong arguments of `{}`: {e}", T::NAME))?;
     let seconds = task.limit().unwrap_or(SECONDS);
     if !(1..=MOST_SECONDS).contains(&seconds) {
-        return Err(format!("`seconds` goes from 1 to {MOST_SECONDS}"));
+        return Err(format!("`seconds` must be from 1 to {MOST_SECONDS}"));
     }
     Ok(Order { limit: Duration::from_secs(seconds), work: Box::new(move |desk, stop| task.perform(desk, stop)) })
 }

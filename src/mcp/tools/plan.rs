@@ -64,8 +64,7 @@ pub struct Planned {
 impl Task for Plan {
     const NAME: &'static str = "plan";
     const TITLE: &'static str = "Schedule a workflow";
-    const ABOUT: &'static str = "Finds in which order the blocks of a workflow that claim instances take turns, so that the whole ends \
-        early: who has which instance when, and how long it all takes.";
+    const ABOUT: &'static str = "Finds the order in which the claiming blocks of a workflow take turns, so that it ends early: which step uses which instance when, and the total time.";
     type Data = Planned;
 
     /// What is not search takes time too.
@@ -77,7 +76,7 @@ impl Task for Plan {
         let bytes = bytes(self.bytes)?;
         let seconds = self.search.unwrap_or(SEARCH);
         if !(1..=super::MOST_SECONDS).contains(&seconds) {
-            return Err(format!("`search` goes from 1 to {}", super::MOST_SECONDS));
+            return Err(format!("`search` must be from 1 to {}", super::MOST_SECONDS));
         }
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
@@ -103,6 +102,6 @@ impl Task for Plan {
 
 fn unplanned(sources: &Sources, found: Vec<Diagnostic>) -> Result<Answer, String> {
     let (findings, said) = told(sources, &judged(named(sources, found), false));
-    let text = format!("there is no schedule, because of what is wrong:\n{said}");
+    let text = format!("no schedule: the protocol has errors:\n{said}");
     Answer::new(text, Planned { schedule: None, left_out: Vec::new(), findings })
 }

@@ -72,8 +72,7 @@ pub struct Ended {
 impl Task for Run {
     const NAME: &'static str = "run";
     const TITLE: &'static str = "Run on the digital twin";
-    const ABOUT: &'static str = "Simulates a workflow on the digital twin (no device is touched) and judges its expectations. Returns the \
-        report: status, expectations with what was measured, what is where at the end, what failed and where.";
+    const ABOUT: &'static str = "Simulates a workflow on the digital twin (no device is used) and judges its expectations. Returns the report: status, expectations with measured values, contents at the end, failures and their places.";
     type Data = Ended;
 
     fn limit(&self) -> Option<u64> {
@@ -97,11 +96,11 @@ impl Task for Run {
         let (findings, said) = told(&sources, &judged(named(&sources, found), false));
         let mut text = format!("{}\n{said}", ran.page());
         if stop.load(Ordering::SeqCst) {
-            text = format!("the run was stopped when its seconds were over; `seconds` may be up to 600\n{text}");
+            text = format!("the run was stopped at its time limit; `seconds` may be up to 600\n{text}");
         }
         let (report, left_out) = pruned(members(&ran.json()?, self.members.as_deref())?, bytes);
         if !left_out.is_empty() {
-            text += &format!("members of the report that are too large to be sent: {}\n", left_out.join(", "));
+            text += &format!("members of the report that are too large to send: {}\n", left_out.join(", "));
         }
         Answer::new(bounded(text, bytes), Ended { passed: ran.passed, report: Some(report), left_out, findings })
     }
@@ -131,7 +130,7 @@ fn is_wrong(found: &[Diagnostic]) -> bool {
 
 fn unrun(sources: &Sources, found: Vec<Diagnostic>) -> Result<Answer, String> {
     let (findings, said) = told(sources, &judged(named(sources, found), false));
-    let text = format!("the protocol was not run, because of what is wrong with it:\n{said}");
+    let text = format!("the protocol was not run because it has errors:\n{said}");
     Answer::new(text, Ended { passed: false, report: None, left_out: Vec::new(), findings })
 }
 
@@ -142,7 +141,7 @@ fn members(report: &str, wanted: Option<&[String]>) -> Result<Map<String, Value>
     let Some(wanted) = wanted else { return Ok(report) };
     if let Some(unknown) = wanted.iter().find(|w| !report.contains_key(*w)) {
         let names: Vec<&str> = report.keys().map(String::as_str).collect();
-        return Err(format!("a report has no member `{unknown}`; it has {}", names.join(", ")));
+        return Err(format!("a report has no member `{unknown}`; use {}", names.join(", ")));
     }
     Ok(report.into_iter().filter(|(name, _)| wanted.contains(name)).collect())
 }

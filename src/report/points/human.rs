@@ -34,7 +34,7 @@ pub(super) fn table(points: &Points, texts: &mut Texts<'_>) -> String {
         let label = harmless_line(&row.point.label);
         let label = if row.ends { format!("end of {label}") } else { label };
         let Some(after) = &row.point.after else {
-            let why = if row.point.reached { "nothing is done behind it" } else { "no way leads here" };
+            let why = if row.point.reached { "no step after it runs" } else { "never reached" };
             head(&place, &label, why, &mut out);
             continue;
         };
@@ -70,7 +70,7 @@ fn after(points: &Points, index: usize, show: impl Fn(&Thing) -> bool, texts: &m
     let label = harmless_line(&point.label);
     let place = line(point.span, texts);
     let Some(after) = &point.after else {
-        let why = if point.reached { "nothing is done behind it" } else { "no way leads here" };
+        let why = if point.reached { "no step after it runs" } else { "never reached" };
         head(&place, &label, why, &mut out);
         return out;
     };

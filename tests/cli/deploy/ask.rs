@@ -285,7 +285,7 @@ workflow warm in bench {
     let left = room.end();
     let said = flat(&left.said);
     assert_eq!(left.code, Some(1), "{said}");
-    assert!(said.contains("`bath`: it was set by hand, and nobody confirmed `stop heating bath`"), "{said}");
+    assert!(said.contains("`bath`: it was set by hand, but nobody confirmed `stop heating bath`"), "{said}");
     began(&left.journal, "stop stirring plate");
 }
 
@@ -311,7 +311,7 @@ workflow guarded in bench {
     room.types("y\n");
     let left = room.end();
     assert_eq!(left.code, Some(0), "{}", left.said);
-    for line in ["no longer asked: is the salt in?", "that answers nothing: the question before was withdrawn"] {
+    for line in ["withdrawn: is the salt in?", "this answers no question: the previous one was withdrawn"] {
         assert!(left.said.contains(line), "`{line}`: {}", left.said);
     }
     began(&left.journal, "stir plate at 300 rpm");

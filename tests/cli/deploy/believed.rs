@@ -71,7 +71,7 @@ fn a_device_that_goes_on_after_it_took_safe_is_named() {
     let said = flat(&ended.err);
     assert_eq!(ended.code, 1, "{said}");
     let wanted =
-        "could not be made safe: `pump`: it took what makes it safe, and still is left pumping by what it tells";
+        "could not be made safe: `pump`: it accepted the `safe` command, but still reports that it is left pumping";
     assert!(said.contains(wanted), "{said}");
 }
 
@@ -88,7 +88,10 @@ fn what_is_known_of_the_end_decides_whether_a_device_is_safe() {
     write(&dir, "lab.mtx", text);
     let ended = goes(&dir, "breaks", &pump.address, &other.address, "");
     let said = flat(&ended.err);
-    assert!(ended.code == 1 && said.contains("could not be made safe: `pump`: it took what makes it safe"), "{said}");
+    assert!(
+        ended.code == 1 && said.contains("could not be made safe: `pump`: it accepted the `safe` command"),
+        "{said}"
+    );
 }
 
 /// What a device is at the end is judged by what it shows, also where that is a reading of a true value.
@@ -128,7 +131,12 @@ workflow go in bench { heat f; wait 300 ms; cool f }
     let ended = deploy_at("1", &dir, &["--mode", "real"]);
     let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("`f` is left hot"), "{said}");
-    assert!(said.contains("could not be made safe: `f`: it took what makes it safe, and still is left hot"), "{said}");
+    assert!(
+        said.contains(
+            "could not be made safe: `f`: it accepted the `safe` command, but still reports that it is left hot"
+        ),
+        "{said}"
+    );
 }
 
 #[test]
@@ -152,7 +160,7 @@ workflow go in bench { let a = h.left.temperature; note \"{a}\" }
     let dir = bench("believed_alike", HOSTED, "h", "localhost:1");
     let ended = deploy_at("1", &dir, &[]);
     let said = flat(&ended.err);
-    let wanted = "`T={degC}`, which `TipLine` expects, cannot be told from what `HostLine` says by itself";
+    let wanted = "the reply `T={degC}` that `TipLine` expects looks like a message that `HostLine` sends by itself";
     assert!(ended.code == 1 && said.contains(wanted), "{said}");
     write(&dir, "lab.mtx", HOSTED.replace("expects \"T=", "expects \"A="));
     let ended = deploy_at("1", &dir, &[]);
@@ -199,7 +207,7 @@ fn whoever_shares_a_line_that_was_opened_anew_is_asked_too() {
     write(&dir, "lab.toml", bindings);
     let ended = deploy_at("1", &dir, &["--mode", "real", "--workflow", "go"]);
     let said = flat(&ended.err);
-    assert!(ended.code == 1 && said.contains("could not be made safe: `other`: it says that it is `ZZ`"), "{said}");
+    assert!(ended.code == 1 && said.contains("could not be made safe: `other`: it identifies as `ZZ`"), "{said}");
     let heard = heard.lock().expect("not poisoned");
     let later: Vec<&str> = heard.iter().filter(|(turn, _)| *turn > 0).map(|(_, line)| line.as_str()).collect();
     assert!(later.contains(&"2:ID?") && !later.contains(&"2:H"), "{later:?}");
@@ -291,7 +299,7 @@ fn another_device_behind_the_line_is_not_made_safe_in_place_of_the_one_that_goes
         let ended = goes(&dir, "go", &address, &other.address, bound);
         let said = flat(&ended.err);
         assert_eq!(ended.code, 1, "{said}");
-        assert!(said.contains("could not be made safe: `pump`: it says that it is `B`, and `A`"), "{said}");
+        assert!(said.contains("could not be made safe: `pump`: it identifies as `B`, but `A`"), "{said}");
         let heard = heard.lock().expect("not poisoned");
         let to_other: Vec<&str> = heard.iter().filter(|(of, _)| *of == "B").map(|(_, line)| line.as_str()).collect();
         assert!(!to_other.is_empty() && to_other.iter().all(|line| *line == "ID?"), "{to_other:?}");

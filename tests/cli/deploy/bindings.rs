@@ -23,33 +23,33 @@ fn refused_bindings_leave_no_journal_behind() {
     write(&dir, "j.jsonl", "something else\n");
     let ended = matterixc_in(&dir, &args);
     assert_eq!(ended.code, 2, "{}", ended.err);
-    assert!(ended.err.contains("give the journal another name"), "{}", ended.err);
+    assert!(ended.err.contains("choose another name for the journal"), "{}", ended.err);
 }
 
 #[test]
 fn what_is_wrong_with_bindings_is_said_where_it_stands() {
     let cases = [
         ("[plat]\nport = \"x\"", "has no `plat`"),
-        ("plate = 3", "bound with a table"),
+        ("plate = 3", "`plate` needs a table"),
         ("[plate]\nprot = \"x\"", "has no `prot`"),
-        ("[plate]\n", "is not said"),
-        ("[plate]\nport = 3", "is a text"),
+        ("[plate]\n", "has no place"),
+        ("[plate]\nport = 3", "must be a text"),
         ("[plate]\nport = \"x\"\naddress = \"y\"", "two lines"),
         ("[plate]\nport = \"x\"\nhttp = \"y\"", "two lines"),
-        ("[plate]\nhttp = \"127.0.0.1:1\"", "speaks over a line"),
+        ("[plate]\nhttp = \"127.0.0.1:1\"", "needs a serial line"),
         ("[plate]\nport = \"x\"\ndriver = \"Cavro\"", "no driver `Cavro`"),
         ("[plate]\nby = \"feet\"", "hands"),
         ("[plate]\nport = \"x\"\ntolerance = { temperature = \"5 g\" }", "a number of K"),
-        ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not tell `colour`"),
-        ("[beaker]\nport = \"x\"", "no driver says"),
-        ("[plate", "not TOML"),
+        ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not report `colour`"),
+        ("[beaker]\nport = \"x\"", "`beaker` has no driver"),
+        ("[plate", "not valid TOML"),
         ("[plate]\naddress = \"nonsense\"", "the port of `nonsense` is missing"),
-        ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is no port"),
-        ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is no port"),
-        ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not spoken here"),
-        ("[plate]\nport = \"\"", "a serial port has a path"),
-        ("[plate]\nport = \"tcp://127.0.0.1:1\"", "begins none"),
-        ("[plate]\nport = \"x\"\ncalibration = 3", "a calibration is a table"),
+        ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is not a port"),
+        ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is not a port"),
+        ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not supported here"),
+        ("[plate]\nport = \"\"", "a serial port needs a path"),
+        ("[plate]\nport = \"tcp://127.0.0.1:1\"", "is not one"),
+        ("[plate]\nport = \"x\"\ncalibration = 3", "a calibration must be a table"),
         ("[plate]\nport = \"x\"\ncalibration = { gain = 3 }", "a text with its unit"),
         ("[ghost]\ncalibration = { gain = \"3 W/K\" }", "declares `ghost`"),
     ];
@@ -64,7 +64,7 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
 fn a_step_that_nobody_is_told_of_is_found_first() {
     let err = found("undriven", HEAT, "");
     assert_eq!(err.matches("error[undriven]").count(), 1, "one device, one finding: {err}");
-    assert!(err.contains("lab.mtx:10") && err.contains("nor at 3 other places"), "{err}");
+    assert!(err.contains("lab.mtx:10") && err.contains("the same at 3 other places"), "{err}");
     assert!(err.contains("[plate]\n") && err.contains("port = \"/dev/ttyUSB0\""), "{err}");
 }
 
@@ -116,7 +116,7 @@ fn a_shadow_needs_something_to_go_by() {
     write(&dir, "lab.toml", "[plate]\nport = \"x\"");
     let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "shadow", "--journal", "j.jsonl"];
     let ended = matterixc_in(&dir, &args);
-    assert!(ended.code == 1 && ended.err.contains("nothing is compared with the twin"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("no device is compared with the twin"), "{}", ended.err);
     assert!(ended.err.contains("lab.toml:2:8") && !dir.join("j.jsonl").exists(), "{}", ended.err);
 }
 
@@ -128,7 +128,7 @@ fn a_decision_on_a_device_that_is_not_bound_says_how_to_bind_it() {
         .replace("    wait until", "    let load = scale.weight\n    if load > 1 kg { wait 1 s }\n    wait until");
     let err = found("unasked", &text, "[plate]\nport = \"x\"");
     let flat = flat(&err);
-    assert!(err.contains("error[unobserved]") && flat.contains("do not say where `scale` is"), "{err}");
+    assert!(err.contains("error[unobserved]") && flat.contains("`scale` has no binding"), "{err}");
     assert!(err.contains("[scale]\n") && !err.contains("undriven"), "{err}");
 }
 
@@ -149,7 +149,7 @@ fn hands_do_what_has_no_line_if_someone_confirms() {
     write(&dir, "lab.mtx", text);
     let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--speed", "40", "--journal"];
     let nobody = matterixc_in(&dir, &[&given[..], &["one"]].concat());
-    assert!(nobody.code == 1 && nobody.err.contains("nobody is there to confirm it"), "{}", nobody.err);
+    assert!(nobody.code == 1 && nobody.err.contains("nobody can confirm it"), "{}", nobody.err);
     let yes = matterixc_in(&dir, &[&given[..], &["two", "--yes"]].concat());
     assert_eq!(yes.code, 0, "{}", yes.err);
     assert!(yes.err.contains("please do this, then confirm: heat plate to 50 degC"), "{}", yes.err);

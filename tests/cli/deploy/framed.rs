@@ -156,7 +156,7 @@ fn readings_are_heard_where_nobody_asks() {
     let silent = Device::start(b'\r', |_, _| Answer::Says("OK\r"));
     let dir = bench("unheard", &text, "bath", &silent.address);
     let ended = deploy(&dir, &["--mode", "real", "--yes"]);
-    assert!(ended.code == 1 && ended.err.contains("did not say anything like `T {degC}`"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("it sent nothing like `T {degC}`"), "{}", ended.err);
 }
 
 #[test]
@@ -196,37 +196,40 @@ fn a_number_without_room_is_found_before_anything_is_sent() {
     let dir = bench("no_room", &text, "bath", "127.0.0.1:1");
     let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
     assert!(ended.code == 1 && ended.out.is_empty(), "{}", ended.out);
-    assert!(ended.err.contains("37 degC cannot be sent in this form"), "{}", ended.err);
+    assert!(ended.err.contains("37 degC cannot be sent in this format"), "{}", ended.err);
 }
 
 /// Findings of `check`, each at a framing or at a line of a driver.
 #[test]
 fn what_cannot_be_framed_or_read_back_is_found() {
     let framings = [
-        ("carries: text", "what a frame looks like is not said"),
-        ("frame: \"{data}\\r\"", "what the frames carry is not said"),
+        ("carries: text", "give the layout of a frame once"),
+        ("frame: \"{data}\\r\"", "a framing needs `carries`"),
         ("carries: words, frame: \"{data}\\r\"", "`text`, `bytes` or `modbus`"),
-        ("carries: text, frame: \"{data}\"", "nothing says where a message ends"),
-        ("carries: text, frame: \"<>\"", "no room for its message"),
-        ("carries: text, frame: \"{data}{data}\\r\"", "stands twice"),
+        ("carries: text, frame: \"{data}\"", "the end of a message is undefined"),
+        ("carries: text, frame: \"<>\"", "no place for the message"),
+        ("carries: text, frame: \"{data}{data}\\r\"", "contains `{data}` twice"),
         ("carries: text, frame: \"{dta}\\r\"", "has no part `dta`"),
         ("carries: text, frame: \"{data}OK\"", "the signs of its end"),
-        ("carries: bytes, frame: \"\\x02{data}\\x03\"", "may be like its end"),
-        ("carries: text, frame: \"{data}{check :u8}\\r\", check: sum8(data)", "checksum may be like the end mark"),
-        ("carries: text, frame: \"{data}{check :u8 hex}\\r\"", "how the checksum is reckoned"),
+        ("carries: bytes, frame: \"\\x02{data}\\x03\"", "may contain the byte of its end mark"),
+        (
+            "carries: text, frame: \"{data}{check :u8}\\r\", check: sum8(data)",
+            "checksum may contain the byte of the end mark",
+        ),
+        ("carries: text, frame: \"{data}{check :u8 hex}\\r\"", "has a checksum, but `check` is missing"),
         ("carries: text, frame: \"{data}\\r\", check: sum8(data)", "no `{check}`"),
         ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: crc16_modbus(data)", "has no room"),
-        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: sum8(check)", "over nothing"),
-        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: sum8(address)", "over nothing"),
-        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: crc17(data)", "no checksum `crc17`"),
-        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: sum8(data, 3)", "no checksum `sum8`"),
-        ("carries: bytes, frame: \"{length :u8}{data}\"", "what the length counts"),
-        ("carries: bytes, frame: \"{data}{length :u8}\", length: count(data)", "before what it counts"),
+        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: sum8(check)", "covers no part of the frame"),
+        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: sum8(address)", "covers no part of the frame"),
+        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: crc17(data)", "unknown checksum `crc17`"),
+        ("carries: text, frame: \"{data}{check :u8 hex}\\r\", check: sum8(data, 3)", "unknown checksum `sum8`"),
+        ("carries: bytes, frame: \"{length :u8}{data}\"", "has a length, but `length` is missing"),
+        ("carries: bytes, frame: \"{data}{length :u8}\", length: count(data)", "before the part that it counts"),
         ("carries: bytes, frame: \"{length :u8}{data}\", length: count(length)", "does not count the message"),
-        ("carries: bytes, frame: \"{length :f32 big}{data}\", length: count(data)", "a whole number of a fixed width"),
-        ("carries: bytes, frame: \"{length :u16}{data}\", length: count(data)", "which byte comes first"),
+        ("carries: bytes, frame: \"{length :f32 big}{data}\", length: count(data)", "a whole number of fixed width"),
+        ("carries: bytes, frame: \"{length :u16}{data}\", length: count(data)", "the byte order is missing"),
         ("carries: text, frame: \"{data}\\r\", silence: 5 min", "at most 1 s"),
-        ("carries: text, frame: \"{data}\\r\", ends: 3", "nothing that a framing has"),
+        ("carries: text, frame: \"{data}\\r\", ends: 3", "not a field of a framing"),
         ("carries: text, frame: \"{data\\r\"", "not closed"),
     ];
     let dir = folder("framing_findings");
@@ -238,22 +241,22 @@ fn what_cannot_be_framed_or_read_back_is_found() {
     }
     let text = |line: &str| bath(PACKET, "framing: packet, address: 1", line);
     let lines = [
-        ("heat to(t) sends \"SP{t as degC :i16 big}\"", "no printable characters"),
-        ("heat to(t) sends \"SP{t as degC :hex}\"", "how many bytes"),
-        ("heat to(t) sends \"SP{t as degC :bcd}\"", "how many digits"),
-        ("heat to(t) sends \"SP{t as degC :08q}\"", "no form of a number"),
-        ("heat to(t) sends \"SP{t as degC :.1}{t as degC :.1}\"", "cannot be told from what follows"),
-        ("heat to(t) sends \"SP{t as degC :.1}0\"", "cannot be told from what follows"),
-        ("heat to(t) sends \"S>{t as degC :.1}\"", "cannot stand in a message"),
-        ("heat to(t) sends \"S\\x02{t as degC :.1}\"", "cannot stand in a message"),
-        ("heat to(t) sends \"SP{t as degC :.1}\", \"ON\" expects \"A\", \"B\", \"C\"", "3 replies are expected to 2"),
-        ("reading temperature asks \"T\" expects \"{degC}{_}\"", "two values must be known"),
+        ("heat to(t) sends \"SP{t as degC :i16 big}\"", "cannot carry the bytes of a number"),
+        ("heat to(t) sends \"SP{t as degC :hex}\"", "needs the number of bytes"),
+        ("heat to(t) sends \"SP{t as degC :bcd}\"", "needs the number of digits"),
+        ("heat to(t) sends \"SP{t as degC :08q}\"", "not a format of a number"),
+        ("heat to(t) sends \"SP{t as degC :.1}{t as degC :.1}\"", "the end of this number is ambiguous"),
+        ("heat to(t) sends \"SP{t as degC :.1}0\"", "the end of this number is ambiguous"),
+        ("heat to(t) sends \"S>{t as degC :.1}\"", "a message of this framing cannot contain"),
+        ("heat to(t) sends \"S\\x02{t as degC :.1}\"", "a message of this framing cannot contain"),
+        ("heat to(t) sends \"SP{t as degC :.1}\", \"ON\" expects \"A\", \"B\", \"C\"", "3 replies are expected for 2"),
+        ("reading temperature asks \"T\" expects \"{degC}{_}\"", "a text between two values"),
         ("reading temperature asks \"T\" expects \"{degC :05.1\"", "not closed"),
-        ("reading active asks \"T\" expects \"{}\"", "which word `active` is"),
+        ("reading active asks \"T\" expects \"{}\"", "the word for `active` once"),
         ("reading active asks \"T\" expects \"{A = yes | B = no}\"", "never `yes`"),
-        ("reading active asks \"T\" expects \"{A = true | A = false}\"", "stands for two words"),
-        ("reading temperature hears \"T {degC}\" every 0 s", "how often a device speaks"),
-        ("reply \"x\\x7b\" fails refused", "a brace stands for a value"),
+        ("reading active asks \"T\" expects \"{A = true | A = false}\"", "given for two words"),
+        ("reading temperature hears \"T {degC}\" every 0 s", "the interval between messages"),
+        ("reply \"x\\x7b\" fails refused", "a brace starts a value"),
         ("reply \"x\\xq\" fails refused", "two hexadecimal digits"),
     ];
     for (line, wanted) in lines {
@@ -262,12 +265,15 @@ fn what_cannot_be_framed_or_read_back_is_found() {
         assert!(ended.code == 1 && ended.out.contains(wanted), "{line}: {}", ended.out);
     }
     let modbus = [
-        ("heat to(t) sends \"write register at 3: {t as degC :i16 * 10}\"", "nothing that Modbus has"),
-        ("heat to(t) sends \"write holding register at 3: {t as degC :.0}\"", "written as bytes"),
+        ("heat to(t) sends \"write register at 3: {t as degC :i16 * 10}\"", "not an object of Modbus"),
+        ("heat to(t) sends \"write holding register at 3: {t as degC :.0}\"", "needs a format in bytes"),
         ("heat to(t) sends \"write holding register at 3: {t as degC :f32 big}\"", "one for each"),
-        ("heat to(t) sends \"write input register at 3: {t as degC :i16}\"", "read only"),
-        ("reading temperature asks \"read input register at 3\" expects \"{degC}\"", "read as bytes"),
-        ("reading temperature asks \"read 2 input registers at 3\" expects \"{degC :f32}\"", "which byte comes first"),
+        ("heat to(t) sends \"write input register at 3: {t as degC :i16}\"", "read-only"),
+        ("reading temperature asks \"read input register at 3\" expects \"{degC}\"", "needs a format in bytes"),
+        (
+            "reading temperature asks \"read 2 input registers at 3\" expects \"{degC :f32}\"",
+            "the byte order is missing",
+        ),
     ];
     for (line, wanted) in modbus {
         let whole = bath("", "framing: modbus_rtu, address: 1", line);
@@ -277,8 +283,8 @@ fn what_cannot_be_framed_or_read_back_is_found() {
     }
     for (over, wanted) in [
         ("framing: packet", "needs the `address`"),
-        ("framing: packet, address: 100", "no address in this framing"),
-        ("framing: cr, address: 1", "no room for an address"),
+        ("framing: packet, address: 100", "not an address of this framing"),
+        ("framing: cr, address: 1", "no place for an address"),
         ("framing: pakcet, address: 1", "did you mean `packet`"),
     ] {
         write(&dir, "lab.mtx", bath(PACKET, over, LINES).split("lab bench").next().expect("a driver"));
@@ -291,5 +297,5 @@ fn what_cannot_be_framed_or_read_back_is_found() {
         "mtx 1\nuse std::furniture\nlab l { ambient: 20 degC }\nworkflow w in l { note \"{1 s :i16 big}\" }\n",
     );
     let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
-    assert!(ended.out.contains("a text for people"), "{}", ended.out);
+    assert!(ended.out.contains("only for messages to devices"), "{}", ended.out);
 }

@@ -101,7 +101,7 @@ fn what_a_person_did_not_read_is_counted() {
     let ended = process.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(0), "{said}");
-    assert!(said.contains("left out here, as nobody read them; a journal has what was done"), "{said}");
+    assert!(said.contains("not shown because nobody read them; a journal has all of them"), "{said}");
 }
 
 #[test]
@@ -143,7 +143,7 @@ fn a_process_that_stood_still_does_not_pass() {
     process.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
     assert_eq!(process.wait().expect("it ends").code(), Some(1), "{said}");
     let one_line = flat(&said);
-    assert!(one_line.contains("error[diverged]") && one_line.contains("this program stood still for"), "{said}");
+    assert!(one_line.contains("error[diverged]") && one_line.contains("this program was paused for"), "{said}");
     let report = std::fs::read_to_string(dir.join("record/report.json")).expect("a report");
     assert!(report.contains("\"held_up\": [\n    {"), "{report}");
     let record = matterixc_in(&dir, &["verify", "record"]);
@@ -186,7 +186,7 @@ fn what_counts_on_is_not_said_twice() {
         process.wait().expect("it ends");
         let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--resume"];
         let ended = matterixc_in(&dir, &args);
-        assert!(ended.code == 1 && ended.err.contains("it is not known whether"), "{name}: {}", ended.err);
+        assert!(ended.code == 1 && ended.err.contains("it is unknown whether"), "{name}: {}", ended.err);
         assert_eq!(device.heard().iter().filter(|line| *line == "NEXT").count(), 1, "{name}");
     }
 }

@@ -30,8 +30,8 @@ fn a_journal_is_not_gone_on_with_on_another_device() {
         let flat = flat(&ended.err);
         assert_eq!(ended.code, 1, "{flat}");
         assert!(flat.contains("error[other-device]: `scale` is another device"), "{flat}");
-        assert!(flat.contains("`B9034`, and `B9021` was there before"), "{flat}");
-        assert!(ended.err.contains("lab.toml:2:11") && ended.err.contains("go on with `--resume`"), "{}", ended.err);
+        assert!(flat.contains("`B9034`, but `B9021` was there before"), "{flat}");
+        assert!(ended.err.contains("lab.toml:2:11") && ended.err.contains("with `--resume`"), "{}", ended.err);
     }
     assert_eq!(second.heard(), ["I4", "I4"], "it is asked who it is, and nothing else");
     let after = std::fs::read_to_string(dir.join("journal")).expect("a journal");
@@ -81,7 +81,7 @@ fn a_device_that_the_bindings_name_is_told_from_others() {
     let flat = flat(&ended.err);
     assert_eq!(ended.code, 1, "{flat}");
     assert!(
-        flat.contains("error[other-device]: `scale`: it says that it is `B9034`, and `B9021` is bound here"),
+        flat.contains("error[other-device]: `scale`: it identifies as `B9034`, but `B9021` is bound here"),
         "{flat}"
     );
     assert!(!flat.contains("could not be made safe"), "{flat}");
@@ -132,11 +132,11 @@ fn what_asks_for_an_identity_keeps_a_word_of_the_answer() {
     write(&dir, "lab.toml", "[valve]\naddress = \"localhost:1\"\nidentity = \"7\"\n");
     let ended = deploy(&dir, &[]);
     assert_eq!(ended.code, 1, "{}", ended.err);
-    assert!(ended.err.contains("`ValveLine` cannot ask `valve` who it is"), "{}", ended.err);
+    assert!(ended.err.contains("the driver `ValveLine` cannot ask `valve` for its identity"), "{}", ended.err);
     for (line, said) in [
-        ("identity sends \"ID\" expects \"ID {_}\"", "no word of the answer says who the device is"),
-        ("identity sends \"ID\"", "no word of the answer says who the device is"),
-        ("identity sends \"A\", \"B\" expects \"{<serial>}\"", "one question asks a device who it is"),
+        ("identity sends \"ID\" expects \"ID {_}\"", "`identity` must keep a word of the reply"),
+        ("identity sends \"ID\"", "`identity` must keep a word of the reply"),
+        ("identity sends \"A\", \"B\" expects \"{<serial>}\"", "`identity` needs exactly one message"),
     ] {
         write(&dir, "lab.mtx", PLAIN.replace("LINE", line));
         let ended = matterixc_in(&dir, &["check", "lab.mtx"]);

@@ -84,7 +84,7 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
         ("the last line is gone", all[..all.len() - 1].concat(), "was cut short"),
         ("half is gone", before[..before.len() / 2].to_owned(), "was cut short"),
         ("all is gone", String::new(), "is empty"),
-        ("no head", lines(&before).to_owned(), "does not begin as one"),
+        ("no head", lines(&before).to_owned(), "does not start like a journal"),
     ];
     for (name, text, why) in cases {
         assert_ne!(text, before, "{name}");
@@ -93,7 +93,7 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
         assert_eq!(ended.code, 1, "{name}: {}", ended.err);
         let one_line = flat(&ended.err);
         assert!(one_line.contains("journal-mismatch") && one_line.contains(why), "{name}: {}", ended.err);
-        assert!(one_line.contains("made safe meanwhile: `plate`"), "{name}: {}", ended.err);
+        assert!(one_line.contains("these devices were made safe: `plate`"), "{name}: {}", ended.err);
         // Nothing is mended, but whoever mends it does not go on either.
         assert_eq!(lines(&journal(&dir)), lines(&text), "{name}: it is left as it is");
         if text.contains("\"state\":\"open\"") {
@@ -105,7 +105,7 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
     write(&dir, "journal", &shut);
     let ended = resumed(&dir, "lab.toml");
     let one_line = flat(&ended.err);
-    assert!(ended.code == 1 && one_line.contains("could not be gone on with"), "{}", ended.err);
+    assert!(ended.code == 1 && one_line.contains("could not be resumed"), "{}", ended.err);
 }
 
 #[test]
@@ -122,8 +122,8 @@ fn another_program_another_seed_and_another_end_are_refused() {
     for dir in [&dir, &seeded_dir] {
         let right = resumed(dir, "lab.toml");
         let one_line = flat(&right.err);
-        assert!(right.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
-        assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
+        assert!(right.code == 1 && one_line.contains("were made safe when it could not be resumed"), "{one_line}");
+        assert!(one_line.contains("these devices were made safe: `plate`"), "{one_line}");
     }
     let again = matterixc_in(&dir, &DEPLOY);
     assert!(again.code == 2 && again.err.contains("--resume"), "{}", again.err);
@@ -222,7 +222,7 @@ fn a_watchdog_that_may_have_tripped_does_not_and_the_plate_is_made_safe() {
     let ended = resumed(&dir, "lab.toml");
     let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("journal-mismatch") && said.contains("its watchdog waits 6 s"), "{said}");
-    assert!(said.contains("made safe meanwhile: `plate`"), "{said}");
+    assert!(said.contains("these devices were made safe: `plate`"), "{said}");
 }
 
 #[test]
@@ -234,7 +234,7 @@ fn two_processes_do_not_write_one_journal() {
     until(&dir, "\"told\"", 2);
     let second = resumed(&dir, "lab.toml");
     assert_eq!(second.code, 2, "{}", second.err);
-    let named = format!("process {} (begun by ", first.id());
+    let named = format!("process {} (started by ", first.id());
     assert!(second.err.contains(&named) && second.err.contains("is writing the journal"), "{}", second.err);
     assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));
     assert_eq!(journal(&dir).matches("\"event\":\"resumed\"").count(), 0);
@@ -253,7 +253,7 @@ fn two_processes_do_not_speak_over_one_line() {
     assert_eq!(second.code, 1, "{}", second.err);
     let said = flat(&second.err);
     assert!(
-        said.contains(&format!("is taken: process {} (", first.id())) && said.contains("nothing was said"),
+        said.contains(&format!("is in use: process {} (", first.id())) && said.contains("nothing was sent"),
         "{said}"
     );
     assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));
@@ -353,7 +353,7 @@ fn an_older_copy_of_a_journal_is_refused_and_the_devices_are_made_safe() {
     let ended = resumed(&dir, "lab.toml");
     let one_line = flat(&ended.err);
     assert!(ended.code == 1 && one_line.contains("is an older copy: it has"), "{one_line}");
-    assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
+    assert!(one_line.contains("these devices were made safe: `plate`"), "{one_line}");
     // It is known from here on that the plate is off, whichever copy is put there.
     write(&dir, "journal", whole);
     let again = resumed(&dir, "lab.toml");
@@ -399,7 +399,7 @@ fn where_nothing_can_be_kept_beside_a_journal_nothing_is_sent() {
         let ended = deployed().expect("the command starts");
         let said = flat(&String::from_utf8_lossy(&ended.stderr));
         assert_eq!(ended.status.code(), Some(1), "{said}");
-        assert!(said.contains("its counterfoil: there is no folder for it"), "{said}");
+        assert!(said.contains("its counterfoil: it has no folder"), "{said}");
         assert!(device.heard().is_empty(), "{:?}", device.heard());
         assert!(!dir.join("journal").exists(), "another attempt finds none");
     }
@@ -436,7 +436,7 @@ fn a_journal_that_is_a_pipe_is_refused_at_once() {
     let made = std::process::Command::new("mkfifo").arg(dir.join("journal")).status();
     assert!(made.expect("mkfifo").success());
     let ended = resumed(&dir, "lab.toml");
-    assert!(ended.code == 2 && ended.err.contains("it is no regular file"), "{}", ended.err);
+    assert!(ended.code == 2 && ended.err.contains("it is not a regular file"), "{}", ended.err);
 }
 
 /// Two plates that are alike.
@@ -475,8 +475,8 @@ fn plates_that_were_exchanged_or_both_moved_are_not_gone_on_with() {
         write(&dir, "now.toml", now);
         let ended = resumed(&dir, "now.toml");
         let one_line = flat(&ended.err);
-        assert!(ended.code == 1 && one_line.contains("nobody can tell which of them is which"), "{name}: {one_line}");
-        assert!(one_line.contains("made safe meanwhile: `left`, `right`"), "{name}: {one_line}");
+        assert!(ended.code == 1 && one_line.contains("they cannot be distinguished"), "{name}: {one_line}");
+        assert!(one_line.contains("these devices were made safe: `left`, `right`"), "{name}: {one_line}");
     }
 }
 
@@ -511,7 +511,7 @@ fn a_journal_of_another_version_is_refused_and_the_devices_are_made_safe() {
     let one_line = flat(&ended.err);
     assert_eq!(ended.code, 1, "{one_line}");
     assert!(one_line.contains("written by version 0.0.1 of this program"), "{one_line}");
-    assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
+    assert!(one_line.contains("these devices were made safe: `plate`"), "{one_line}");
 }
 
 /// What a plate is asked when a deployment of this workflow is gone on with.

@@ -44,8 +44,8 @@ fn a_no_in_a_finally_does_not_hold_up_what_switches_off() {
     // Nobody is there: each question is answered with no at once.
     let ended = deploy(&dir, &["--mode", "real"]);
     assert!(heard(&device, "STOP_1") > 0, "{:?}", device.heard());
-    assert!(ended.code == 1 && ended.err.contains("a question was answered with no"), "{}", ended.err);
-    assert!(ended.err.contains("nobody was there to confirm"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("a person answered no"), "{}", ended.err);
+    assert!(ended.err.contains("nobody could confirm"), "{}", ended.err);
 }
 
 #[test]
@@ -81,7 +81,7 @@ workflow warm in bench {
     write(&dir, "lab.toml", bound);
     let ended = deploy(&dir, &["--mode", "real", "--yes"]);
     let one_line = flat(&ended.err);
-    let named = "a `finally` broke off: `stop stirring other`, `ask \"is it cool?\"` not done";
+    let named = "a `finally` stopped early: `stop stirring other`, `ask \"is it cool?\"` did not run";
     assert!(ended.code == 1 && one_line.contains(named), "{one_line}");
     assert!(heard(&other, "STOP_4") > 0, "safe all the same: {:?}", other.heard());
 }
@@ -106,12 +106,12 @@ workflow warm in bench {
     let full = shell.stdin(std::process::Stdio::null()).output().expect("bash");
     let err = String::from_utf8_lossy(&full.stderr);
     let one_line = flat(&err);
-    assert!(one_line.contains("the journal cannot be written") && one_line.contains("begin anew"), "{err}");
+    assert!(one_line.contains("the journal cannot be written") && one_line.contains("start again"), "{err}");
     assert!(heard(&device, "STOP_1") > 0, "{:?}", device.heard());
     let started = heard(&device, "START_1");
     let more = crate::harness::matterixc_in(&dir, &[&args[..], &["--resume"]].concat());
     let one_line = flat(&more.err);
-    assert!(more.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
+    assert!(more.code == 1 && one_line.contains("were made safe when it could not be resumed"), "{one_line}");
     assert_eq!(heard(&device, "START_1"), started, "{:?}", device.heard());
 }
 

@@ -146,7 +146,7 @@ fn a_run_that_a_person_stops_at_the_robot_ends_and_its_modules_are_switched_off(
     let heard = robot.lock().expect("not poisoned").heard.clone();
     let after: Vec<&String> = heard.iter().skip_while(|h| !h.contains("ShakeSpeed")).collect();
     assert!(!after.iter().any(|h| h.contains("pickUpTip")), "{after:?}");
-    assert!(ended.err.contains("`ot2`: it answered"), "{}", ended.err);
+    assert!(ended.err.contains("`ot2`: it replied"), "{}", ended.err);
     for off in ["heaterShaker/deactivateHeater", "heaterShaker/deactivateShaker"] {
         let said = |h: &&String| h.starts_with("POST /commands?") && h.ends_with(off);
         assert_eq!(after.iter().filter(|h| said(h)).count(), 1, "{off}: {after:?}");

@@ -238,7 +238,7 @@ fn a_device_that_switches_itself_off_while_a_plan_waits_is_noticed() {
     let ended = crate::harness::matterixc_in(&dir, &given);
     let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("error[diverged]"), "{said}");
-    assert!(said.contains("`box.active` is false on the device, not true as it was told"), "{said}");
+    assert!(said.contains("`box.active` is false on the device, but it was set to true"), "{said}");
     assert!(!said.contains("finally"), "it is carried out whole: {said}");
     assert_eq!(device.heard().iter().filter(|line| *line == "OFF").count(), 1, "{:?}", device.heard());
     let record = crate::harness::matterixc_in(&dir, &["verify", "record"]);
@@ -314,5 +314,5 @@ fn a_line_that_owes_an_answer_and_is_never_silent_is_named() {
     let ended = slow("restless", &[2100, 60_000], true);
     let said = flat(&ended.err);
     assert!(ended.code == 1 && said.contains("error[device-garbled]"), "{said}");
-    assert!(said.contains("it owes an answer to `T?`, and nothing else is said to it before"), "{said}");
+    assert!(said.contains("it still owes a reply to `T?`: nothing else is sent before"), "{said}");
 }

@@ -40,9 +40,13 @@ fn a_record_is_whole_and_is_gone_through_again_to_the_last_bit() {
     let digest = ended.err.split("the record is sealed: ").nth(1).and_then(|r| r.split_whitespace().next());
     let checked = verified(&dir);
     assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
-    for line in
-        ["are as they were sealed", "is one chain", "the one that was carried out", "to the last bit", "says what"]
-    {
+    for line in [
+        "are unchanged since they were sealed",
+        "an unbroken chain",
+        "the one of the journal",
+        "to the last bit",
+        "agrees with",
+    ] {
         assert!(checked.out.contains(line), "{line}: {}", checked.out);
     }
     assert!(digest.is_some_and(|d| checked.out.contains(d)), "{} {}", ended.err, checked.out);
@@ -75,7 +79,7 @@ fn a_record_that_was_changed_anywhere_is_known_for_one() {
         std::fs::write(&path, &changed).expect("written");
         let checked = verified(&dir);
         assert_eq!(checked.code, 1, "{file}: {}{}", checked.out, checked.err);
-        assert!(checked.out.contains(&format!("wrong: `{file}` is not as it was sealed")), "{}", checked.out);
+        assert!(checked.out.contains(&format!("wrong: `{file}` has changed since it was sealed")), "{}", checked.out);
         std::fs::write(&path, &before).expect("written");
     }
     // Who writes the seals anew is found out by the replay.
@@ -86,7 +90,7 @@ fn a_record_that_was_changed_anywhere_is_known_for_one() {
     std::fs::write(record.join("journal.jsonl"), journal).expect("written");
     std::fs::write(record.join("more"), "more").expect("written");
     let checked = verified(&dir);
-    assert!(checked.code == 1 && checked.out.contains("`more` is no part"), "{}", checked.out);
+    assert!(checked.code == 1 && checked.out.contains("`more` is not part"), "{}", checked.out);
 }
 
 #[test]
@@ -130,7 +134,7 @@ fn a_record_of_a_deployment_that_failed_is_gone_through_again_too() {
     let checked = verified(&dir);
     assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
     let page = std::fs::read_to_string(dir.join("signed/report.md")).expect("a page");
-    assert!(page.contains("## What went wrong") && page.contains("## Made safe"), "{page}");
+    assert!(page.contains("## Failures") && page.contains("## Made safe"), "{page}");
 }
 
 #[test]
@@ -138,7 +142,7 @@ fn what_is_refused_beforehand_leaves_no_record() {
     let (dir, _) = room("refused");
     write(&dir, "lab.toml", "[plate]\naddress = \"127.0.0.1:1\"\n");
     let ended = matterixc_in(&dir, &DEPLOY);
-    assert!(ended.code == 1 && ended.err.contains("nothing was said"), "{}", ended.err);
+    assert!(ended.code == 1 && ended.err.contains("nothing was sent"), "{}", ended.err);
     assert!(!dir.join("signed").exists());
 }
 

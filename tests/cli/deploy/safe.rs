@@ -72,7 +72,7 @@ fn a_device_that_answers_nothing_any_more_is_named() {
     let dir = bench("safe_dead", HEAT, "plate", &device.address);
     let ended = deploy(&dir, &["--mode", "real"]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("a device could not be made safe: `plate`: it did not answer"), "{}", ended.err);
+    assert!(ended.err.contains("a device could not be made safe: `plate`: it did not reply"), "{}", ended.err);
     assert!(is_safe(&device.heard()), "it is told all the same: {:?}", device.heard());
 }
 
@@ -137,8 +137,8 @@ fn a_stroke_is_terminated_without_what_would_start_it_again() {
 fn a_stroke_that_cannot_be_terminated_is_named() {
     let (_, code, said) = stopped_stroke("safe_refuses", "/0b\u{3}\r\n");
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("a device did not stop when it was told to: `pump`: it answered `error 2`"), "{said}");
-    assert!(said.contains("a device could not be made safe: `pump`: it answered `error 2`"), "{said}");
+    assert!(said.contains("a device did not stop on command: `pump`: it replied `error 2`"), "{said}");
+    assert!(said.contains("a device could not be made safe: `pump`: it replied `error 2`"), "{said}");
 }
 
 /// A heater of a user's own, whose driver says nothing of how it is made safe.
@@ -209,7 +209,7 @@ fn a_device_whose_driver_does_not_say_how_it_is_made_safe_is_named() {
     let ended = deploy(&dir, &["--mode", "real"]);
     assert_eq!(ended.code, 1);
     let said = flat(&ended.err);
-    assert!(said.contains("could not be made safe: `plate`: its driver has no line `safe`"), "{}", ended.err);
+    assert!(said.contains("could not be made safe: `plate`: its driver has no `safe` line"), "{}", ended.err);
 }
 
 /// With a watchdog that waits so long, and is fed so often.
@@ -226,7 +226,7 @@ fn a_watchdog_is_fed_before_it_trips() {
     let dir = bench("watched", OWN, "plate", "127.0.0.1:1");
     for (every, within, wrong) in [("6 s", "6 s", true), ("10 s", "6 s", true), ("5.9 s", "6 s", false)] {
         let found = check(&dir, &watched(every, within));
-        assert_eq!(found.contains("a watchdog that waits 6 s hears something only every"), wrong, "{every}: {found}");
+        assert_eq!(found.contains("the watchdog waits 6 s, but a message comes only every"), wrong, "{every}: {found}");
         assert_eq!(found.contains("error"), wrong, "{every}: {found}");
     }
     // Without a patience it is no watchdog, and says so.

@@ -231,7 +231,7 @@ fn what_was_measured_of_labware_is_told_once_a_person_confirms_it() {
     }
     // A file that it runs by itself is not what was confirmed.
     let played = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
-    assert!(played.code == 1 && played.err.contains("nobody is asked here"), "{}", played.err);
+    assert!(played.code == 1 && played.err.contains("this command does not ask anyone"), "{}", played.err);
 }
 
 #[test]
@@ -253,14 +253,16 @@ fn a_line_of_another_kind_is_refused() {
     write(&dir, "lab.toml", "[ot2]\naddress = \"127.0.0.1:1\"\n");
     let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
     assert_eq!(ended.code, 1);
-    assert!(ended.err.contains("speaks over HTTP") && ended.err.contains("write `http ="), "{}", ended.err);
+    assert!(ended.err.contains("needs HTTP") && ended.err.contains("write `http ="), "{}", ended.err);
 }
 
 #[test]
 fn where_no_server_can_be_is_found_before_anything_is_opened() {
     let dir = bench("nonsense", "");
-    let cases =
-        [("nonsense", "the port of `nonsense` is missing"), ("https://robot:31950", "`https://` is not spoken here")];
+    let cases = [
+        ("nonsense", "the port of `nonsense` is missing"),
+        ("https://robot:31950", "`https://` is not supported here"),
+    ];
     for (place, said) in cases {
         write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{place}\"\n"));
         let ended = deploy(&dir, &["--mode", "real"]);
@@ -290,12 +292,12 @@ fn what_no_server_understands_is_found_before_anything_is_sent() {
         )
     };
     let cases = [
-        ("open sends \"FETCH /state\"", "is no method"),
-        ("open sends \"GET state\"", "is no path"),
-        ("open sends \"POST /state on=1\"", "is no member of a body"),
-        ("open sends \"GET /jobs/<job>\"", "nothing says what `<job>` is"),
+        ("open sends \"FETCH /state\"", "is not a method"),
+        ("open sends \"GET state\"", "is not a path"),
+        ("open sends \"POST /state on=1\"", "is not a member of a body"),
+        ("open sends \"GET /jobs/<job>\"", "`<job>` is never set"),
         ("open sends \"GET /state\" expects \"fine\"", "is neither a status"),
-        ("stop heating sends \"POST /off\" until asks \"GET /state\" timeout 1 s", "nothing but an answer says"),
+        ("stop heating sends \"POST /off\" until asks \"GET /state\" timeout 1 s", "only a reply can report"),
     ];
     for (line, said) in cases {
         write(&dir, "lab.mtx", text(line));
@@ -321,7 +323,7 @@ fn an_emitted_protocol_is_uploaded_and_played() {
     for target in ["opentrons-json", "opentrons-python"] {
         let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", target, "--play", "lab.toml"]);
         assert_eq!(ended.code, 0, "{target}: {}{}", ended.out, ended.err);
-        assert!(ended.err.contains("`ot2` has run it to its end"), "{target}: {}", ended.err);
+        assert!(ended.err.contains("`ot2` has run the file"), "{target}: {}", ended.err);
     }
 }
 
@@ -348,5 +350,5 @@ fn what_a_server_says_against_a_protocol_is_shown_where_it_is_bound() {
     assert!(ended.err.contains("lab.toml:2:8"), "{}", ended.err);
     write(&dir, "lab.toml", "[ot2]\nhttp = \"127.0.0.1:1\"\n");
     let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
-    assert!(ended.err.contains("nothing listens") && ended.err.contains("lab.toml:2:8"), "{}", ended.err);
+    assert!(ended.err.contains("no program listens") && ended.err.contains("lab.toml:2:8"), "{}", ended.err);
 }

@@ -115,7 +115,7 @@ fn frozen(name: &str, signals: usize) -> (String, Duration) {
 fn a_frozen_server_is_waited_for_for_seconds_only() {
     let (said, took) = frozen("frozen", 1);
     assert!(said.contains("was stopped by a person"), "{said}");
-    assert!(said.contains("a device could not be made safe: `ot2`: it did not answer"), "{said}");
+    assert!(said.contains("a device could not be made safe: `ot2`: it did not reply"), "{said}");
     assert!(said.contains("lab.toml:2:8"), "{said}");
     // 10 s for what was asked, 5 s for what makes it safe.
     assert!(took < Duration::from_secs(25), "{took:?}");

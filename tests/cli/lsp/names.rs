@@ -125,7 +125,7 @@ fn another_name_goes_through_all_files() {
     let refused = |editor: &mut Client, at: Value, name: &str| {
         editor.ask("textDocument/rename", renaming(&at, name)).unwrap_err()["message"].as_str().unwrap().to_string()
     };
-    assert_eq!(refused(&mut editor, here.clone(), "goal"), "`goal` is the name of a parameter already");
+    assert_eq!(refused(&mut editor, here.clone(), "goal"), "`goal` is already the name of a parameter");
     assert_eq!(refused(&mut editor, here, "2x"), "`2x` cannot be the name of a thing in a lab");
     let refusal = editor.ask("textDocument/prepareRename", about(&work_at, &work, "temperature >", 0)).unwrap_err();
     assert_eq!(refusal["message"], "`temperature` belongs to the standard library");

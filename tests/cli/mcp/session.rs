@@ -81,7 +81,7 @@ fn a_check_says_what_the_command_says_and_names_corrections() {
     let fixed = client.data("fix", json!({ "text": twice, "ids": [id, id] }));
     assert_eq!(fixed["applied"].as_array().map(Vec::len), Some(1), "{found} {fixed}");
     let stale = client.refused("fix", json!({ "path": "w.mtx", "ids": ids }));
-    assert!(stale.contains("there is no correction"), "{stale}");
+    assert!(stale.contains("this text has no fix"), "{stale}");
     assert_eq!(client.close(), Some(0));
 }
 
@@ -165,27 +165,27 @@ fn what_does_not_fit_is_said_in_words_and_the_session_goes_on() {
         ("check", json!({ "path": 7 }), "invalid type"),
         ("check", json!({ "path": "w.mtx", "fidelity": "exact" }), "unknown variant `exact`"),
         ("check", json!({ "path": "w.mtx", "seconds": 0 }), "from 1 to 600"),
-        ("check", json!({ "path": "no.mtx" }), "there is no such file"),
+        ("check", json!({ "path": "no.mtx" }), "the file does not exist"),
         ("check", json!({ "path": "" }), "is a directory"),
         ("check", json!({ "path": "w.mtx\u{0}" }), "cannot read"),
         ("fix", json!({ "path": "w.mtx" }), "either `ids` or `which`"),
-        ("fix", json!({ "text": WARM, "which": "all", "write": true }), "no file that could be written"),
-        ("run", json!({ "path": "w.mtx", "bytes": 1 }), "`bytes` goes from"),
-        ("run", json!({ "path": "w.mtx", "unseen": "2mm" }), "`--unseen` is of robots that move"),
+        ("fix", json!({ "text": WARM, "which": "all", "write": true }), "has no file to write"),
+        ("run", json!({ "path": "w.mtx", "bytes": 1 }), "`bytes` must be from"),
+        ("run", json!({ "path": "w.mtx", "unseen": "2mm" }), "`--unseen` needs"),
         ("run", json!({ "path": "w.mtx", "unseen": "2", "fidelity": "motion" }), "`unseen`: write a length"),
         (
             "run",
             json!({ "path": "w.mtx", "really": "grip=0.5", "fidelity": "motion" }),
             "it needs `--fidelity contact`",
         ),
-        ("contents", json!({ "path": "w.mtx", "column": 3 }), "a `column` is one of a `line`"),
-        ("plan", json!({ "path": "w.mtx", "search": 10000 }), "`search` goes from"),
+        ("contents", json!({ "path": "w.mtx", "column": 3 }), "`column` needs a `line`"),
+        ("plan", json!({ "path": "w.mtx", "search": 10000 }), "`search` must be from"),
     ] {
         let why = client.refused(tool, arguments.clone());
         assert!(why.contains(says), "{tool} {arguments}: {why}");
     }
     let error = client.ask("tools/call", json!({ "name": "deploy", "arguments": {} }))["error"].take();
-    assert!(error["message"].as_str().is_some_and(|m| m.contains("no tool `deploy`; there are check")), "{error}");
+    assert!(error["message"].as_str().is_some_and(|m| m.contains("unknown tool `deploy`; use check")), "{error}");
     assert!(client.ask("tools/lis", json!({}))["error"].is_object());
     assert!(client.ask("tools/call", json!({ "arguments": {} }))["error"].is_object());
     client.line("this is not json");
@@ -236,7 +236,7 @@ fn nothing_outside_of_the_folder_is_read_or_written() {
             let mut arguments = more;
             arguments["path"] = json!(path);
             let why = client.refused(tool, arguments);
-            assert!(why.contains("is not in the folder of the server"), "{path}: {why}");
+            assert!(why.contains("is outside the folder of the server"), "{path}: {why}");
         }
     }
     for path in ["w.mtx", "here.mtx", "sub/../w.mtx", inside.join("w.mtx").to_str().expect("text")] {
@@ -251,7 +251,7 @@ fn nothing_outside_of_the_folder_is_read_or_written() {
         let text = format!("mtx 1\nuse std::bodies::Body\nasset A: Body from labware \"{file}\" {{}}\n");
         let data = client.data("check", json!({ "text": text }));
         let said = data.to_string();
-        assert!(said.contains("outside of the folder") && !said.contains("root:"), "{said}");
+        assert!(said.contains("outside the allowed folder") && !said.contains("root:"), "{said}");
     }
     assert_eq!(client.close(), Some(0));
     assert_eq!(fs::read_to_string(dir.join("secret.mtx")).expect("it"), "mtx 1\n//! secret\n");
@@ -264,7 +264,7 @@ fn a_call_can_be_cancelled_and_ends_when_its_time_is_over() {
     let mut client = Client::new(&folder("mcp_cancel"));
     let result = client.call("run", json!({ "text": endless, "seconds": 1 }));
     let said = read(&result);
-    assert!(said.contains("stopped when its seconds were over"), "{said}");
+    assert!(said.contains("stopped at its time limit"), "{said}");
     assert_eq!(result["structuredContent"]["report"]["status"], "cancelled");
     // More than are worked on at once: were they not stopped, the next call would find no place.
     for _ in 0..6 {
@@ -309,5 +309,8 @@ fn a_client_that_goes_away_ends_the_server() {
     assert_eq!(Client::new(root()).close(), Some(0));
     assert_eq!(Client::silent(root()).close(), Some(0));
     let ended = matterixc_in(root(), &["mcp", "--root", "no/such/folder"]);
-    assert_eq!((ended.code, ended.err.as_str()), (2, "error: cannot serve `no/such/folder`: there is no such file\n"));
+    assert_eq!(
+        (ended.code, ended.err.as_str()),
+        (2, "error: cannot serve `no/such/folder`: the file does not exist\n")
+    );
 }

@@ -43,7 +43,9 @@ pub fn from_recording(file: &[u8]) -> Result<Document, RecordingError> {
     tables::read(&topics, &owners, &mut document);
     story::read(&topics, &texts, &mut document);
     if document.bodies.is_empty() && document.plan.is_empty() {
-        return Err(RecordingError("this MCAP file has no `/scene` and no `/plan`: it is not of a run".to_owned()));
+        return Err(RecordingError(
+            "this MCAP file has no `/scene` and no `/plan`: it is not the recording of a run".to_owned(),
+        ));
     }
     Ok(document)
 }

@@ -47,7 +47,7 @@ impl Walk<'_> {
             WireKind::Reply { fails, .. } => self.failure(fails),
             WireKind::Answers { with, .. } => self.text(with),
             WireKind::Fixed { when, condition, exchange } => {
-                self.language(when.span, "when it is said");
+                self.language(when.span, "when it is sent");
                 self.exprs(condition);
                 self.exchange(exchange);
             }

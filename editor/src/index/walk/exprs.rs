@@ -86,7 +86,7 @@ impl Walk<'_> {
                 self.language(fold.span, "over all of a set");
                 let each = match &*set.kind {
                     ExprKind::Name(n) if n.text == REACTION && self.find(n).is_none() => {
-                        self.language(n.span, "every reaction of the file and what it imports");
+                        self.language(n.span, "every reaction of the file and its imports");
                         Sort::Reaction
                     }
                     _ => {

@@ -55,7 +55,7 @@ impl Walk<'_> {
                         && let ExprKind::Name(n) = &**kind
                         && n.text == "rest"
                     {
-                        self.language(n.span, "what the others leave of the whole");
+                        self.language(n.span, "the rest, up to the whole");
                         continue;
                     }
                     self.value(&f.value);

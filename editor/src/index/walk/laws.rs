@@ -45,7 +45,7 @@ impl Walk<'_> {
     fn effect_call(&mut self, call: &Expr) {
         if let matterix_lang::ast::ExprKind::Call(callee, args) = &*call.kind {
             if let matterix_lang::ast::ExprKind::Name(n) = &*callee.kind {
-                self.language(n.span, "an effect on what vessels hold");
+                self.language(n.span, "an effect on the contents of vessels");
             }
             for arg in args {
                 if let Some(name) = &arg.name {
@@ -89,7 +89,7 @@ impl Walk<'_> {
     pub(super) fn failure(&mut self, name: &Name) {
         match self.index.failure(&name.text).or_else(|| self.index.hazard(&name.text)) {
             Some(def) => self.known(name.span, def),
-            None => self.language(name.span, "a failure that the language raises itself"),
+            None => self.language(name.span, "a failure raised by the language"),
         }
     }
 

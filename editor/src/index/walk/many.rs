@@ -104,7 +104,7 @@ impl Walk<'_> {
                         self.value_of(def)
                     }
                     None => {
-                        self.language(name.span, "a part of what is given");
+                        self.language(name.span, "a part of an argument");
                         Found::nothing()
                     }
                 }

@@ -13,7 +13,7 @@ const BUILT_IN: &[(&str, &str)] = &[
     ("Int", "a whole number"),
     ("Species", "a species"),
     ("Reaction", "a reaction"),
-    ("Material", "what a vessel is made of"),
+    ("Material", "the material of a vessel"),
     ("Frame", "a named point of a thing"),
     ("Range", "from one value to another: `Range<Temperature>`"),
     ("List", "several of one kind: `List<Vessel>`"),

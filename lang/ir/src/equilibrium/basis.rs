@@ -15,7 +15,7 @@ pub struct Circle {
     pub factors: Vec<f64>,
 }
 
-/// Why a system has no basis: a solid in an equation is bound to nothing dissolved, or there is no solvent.
+/// Why a system has no basis: a solid in an equation is bound to nothing dissolved, or no solvent is present.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unsettled(pub String);
 
@@ -120,7 +120,7 @@ impl Basis {
         let phase = |i: usize| written.members[i].phase;
         let count = written.members.len();
         let water = (0..count).find(|i| phase(*i) == Phase::Solvent);
-        let water = water.ok_or_else(|| Unsettled("there is no solvent".into()))?;
+        let water = water.ok_or_else(|| Unsettled("no solvent is present".into()))?;
         let (rows, circles) = reduced(written)?;
         let formed: Vec<usize> = rows.iter().map(|(pivot, _)| *pivot).collect();
         let is_dissolved = |i: usize| phase(i).is_dissolved() || phase(i) == Phase::Formal;
@@ -242,7 +242,7 @@ fn reduced(written: &Written) -> Result<Reduced, Unsettled> {
             continue;
         }
         let Some(pivot) = pivot(written, &row) else {
-            return Err(Unsettled(format!("`{}` relates nothing that is dissolved", equation.name)));
+            return Err(Unsettled(format!("`{}` contains no dissolved species", equation.name)));
         };
         row.scale(1.0 / row.members[pivot]);
         for (_, other) in &mut done {
@@ -256,7 +256,7 @@ fn reduced(written: &Written) -> Result<Reduced, Unsettled> {
     let is_formed = |i: usize| done.iter().any(|(pivot, _)| *pivot == i);
     let mut solids = (0..written.members.len()).filter(|i| written.members[*i].phase == Phase::Solid);
     match solids.find(|i| !is_formed(*i)) {
-        Some(i) => Err(Unsettled(format!("nothing says what of `{}` dissolves", written.members[i].name))),
+        Some(i) => Err(Unsettled(format!("the dissolved form of `{}` is unknown", written.members[i].name))),
         None => Ok((done, circles)),
     }
 }

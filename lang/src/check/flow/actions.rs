@@ -476,8 +476,8 @@ impl Interpreter<'_, '_> {
     }
 
     fn cascades_perhaps(&mut self) {
-        let headline = format!("events set each other off more than {MOST_EVENTS} times");
-        self.not_analysed(Severity::Advice, headline, "what they change is unknown from here on");
+        let headline = format!("events trigger each other more than {MOST_EVENTS} times");
+        self.not_analysed(Severity::Advice, headline, "the values that they change are unknown from here on");
     }
 
     /// Does what an event does; the states that are no longer what they were.

@@ -158,8 +158,8 @@ impl Interpreter<'_, '_> {
             changes += 1;
         }
         if changes == MOST_CHANGES {
-            let headline = format!("flows and timers change more than {MOST_CHANGES} times in this step");
-            self.not_analysed(Severity::Advice, headline, "what they come to is known in bounds only");
+            let headline = format!("flows and timers switch more than {MOST_CHANGES} times in this step");
+            self.not_analysed(Severity::Advice, headline, "`check` knows only bounds of their results");
         }
         Course::Left(left)
     }

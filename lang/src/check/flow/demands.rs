@@ -18,7 +18,7 @@ const MOST_AT_ONCE: f64 = 100_000.0;
 const BEHIND: f64 = 1e-6;
 
 impl Interpreter<'_, '_> {
-    /// Conditions that are asked for all the time and hold now: they end the step that is followed where they break.
+    /// Conditions that are must be true throughout and hold now: they end the step that is followed where they break.
     pub(super) fn may_break_here(&mut self, facts: &AbstractState) -> Vec<(NodeId, bool)> {
         // What is followed aside, or more closely, is no step that goes on.
         if self.unbroken.is_empty() || self.refinements > 0 || self.guards.is_empty() {
@@ -58,8 +58,8 @@ impl Interpreter<'_, '_> {
         for condition in self.kept.clone() {
             if self.fails(condition, "broken", facts) {
                 let label = self.called(label);
-                let headline = format!("`{label}` breaks `{}`, which is kept here", condition.text);
-                let about = Some((condition.span, "kept from here on"));
+                let headline = format!("`{label}` makes `{}` false, which must stay true here", condition.text);
+                let about = Some((condition.span, "must stay true from here on"));
                 self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
             }
         }
@@ -70,9 +70,8 @@ impl Interpreter<'_, '_> {
         for condition in self.during.clone() {
             if self.fails(condition, "broken", facts) {
                 let label = self.called(label);
-                let headline =
-                    format!("`{label}` cannot go on to its end: `{}` does not hold any more", condition.text);
-                let about = Some((condition.span, "asked for all the time"));
+                let headline = format!("`{label}` stops early: `{}` becomes false", condition.text);
+                let about = Some((condition.span, "must be true throughout"));
                 self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
                 let states = self.parts(condition.node).states.clone();
                 self.forget(&states, facts);
@@ -91,8 +90,8 @@ impl Interpreter<'_, '_> {
                 return Asked::Handled;
             }
             let label = self.called(label);
-            let headline = format!("`{label}` cannot begin: `{}` does not hold", condition.text);
-            let about = Some((condition.span, "asked for all the time"));
+            let headline = format!("`{label}` cannot start: `{}` is false", condition.text);
+            let about = Some((condition.span, "must be true throughout"));
             self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
             return Asked::Unmet;
         }
@@ -107,11 +106,11 @@ impl Interpreter<'_, '_> {
                 continue;
             }
             let (label, kept) = (self.called(label), &condition.text);
-            let headline = format!("`{label}` can only end when `{kept}`, which is kept here, is broken");
-            let said = format!("`{}` and `{kept}` exclude each other", awaited.text);
+            let headline = format!("`{label}` cannot end while `{kept}` must stay true");
+            let said = format!("`{}` and `{kept}` cannot both be true", awaited.text);
             let d = self.at_site(codes::EXPECTATION_FAILED, headline, said, self.doubt > 0);
-            let d = d.because(condition.span, "kept from here on");
-            let d = d.help("wait for a value within what is kept, or end the `keep` before the wait");
+            let d = d.because(condition.span, "must stay true from here on");
+            let d = d.help("wait for a value that `keep` allows, or end the `keep` before the wait");
             self.found(d, condition.span);
         }
     }
@@ -151,12 +150,12 @@ impl Interpreter<'_, '_> {
         for promise in promises {
             if self.fails(promise, "promise", facts) {
                 let label = self.called(label);
-                let headline = format!("`{label}` promises `{}`, which does not hold at its end", promise.text);
+                let headline = format!("`{label}` does not achieve its effect: `{}` is false at its end", promise.text);
                 self.asked_in_vain(
                     codes::PROMISE_BROKEN,
                     headline,
                     promise,
-                    Some((promise.span, "promised here")),
+                    Some((promise.span, "its effect is declared here")),
                     facts,
                 );
             }
@@ -173,7 +172,7 @@ impl Interpreter<'_, '_> {
         self.enclose(node, facts);
         let Some(at) = undefined(graph, node, &mut |n| self.values.of(n).exact()) else { return false };
         let headline = format!("this has no value: {}", why(graph, at));
-        let d = self.at_site(codes::NOT_A_NUMBER, headline, "asked for here".to_string(), self.doubt > 0);
+        let d = self.at_site(codes::NOT_A_NUMBER, headline, "used here".to_string(), self.doubt > 0);
         self.found(d, span);
         true
     }
@@ -194,14 +193,14 @@ impl Interpreter<'_, '_> {
     pub(super) fn runs_out(&mut self, condition: &Condition, most: f64, facts: &AbstractState) {
         if self.fails_not(condition, "max", facts) {
             let turns = if most == 1.0 { "1 turn".to_string() } else { format!("{} turns", show_number(most)) };
-            let headline = format!("`{}` still holds after {turns}, and the loop fails with `max`", condition.text);
+            let headline = format!("`{}` is still true after {turns}: the loop fails with `max`", condition.text);
             let mut is =
                 |c: &Comparison| format!("`{}` is {}", c.text, shown(&self.eval(c.value, facts), |v| c.unit.show(v)));
             let said: Vec<String> = condition.compared.iter().map(&mut is).collect();
-            let said = if said.is_empty() { "turns run out".to_string() } else { said.join(", ") };
+            let said = if said.is_empty() { "no turns are left".to_string() } else { said.join(", ") };
             let d = self.at_site(codes::NOT_REACHED, headline, said, self.doubt > 0);
             let d = self.with_history(d, condition, facts);
-            self.found(d.help("allow more turns, or say what happens then: `on max { }`"), condition.span);
+            self.found(d.help("allow more turns, or handle the failure: `on max { }`"), condition.span);
         }
     }
 
@@ -211,11 +210,11 @@ impl Interpreter<'_, '_> {
             return self.runs_out(condition, most, facts);
         }
         if self.fails_not(condition, "max", facts) {
-            let headline = format!("`{}` holds in every turn, and no time passes in any of them", condition.text);
-            let said = "goes on for ever at one moment".to_owned();
+            let headline = format!("`{}` stays true in every turn, and no turn takes any time", condition.text);
+            let said = "this loop never ends".to_owned();
             let d = self.at_site(codes::ENDLESS_INSTANT, headline, said, self.doubt > 0);
             let d = self.with_history(d, condition, facts);
-            self.found(d.help("let the body wait, or change what the condition asks for"), condition.span);
+            self.found(d.help("let the body wait, or change the condition"), condition.span);
         }
     }
 
@@ -247,7 +246,7 @@ impl Interpreter<'_, '_> {
         facts: &AbstractState,
     ) {
         let measured = self.measured(condition, facts);
-        let said = if measured.is_empty() { "not so here".to_string() } else { measured.join(", ") };
+        let said = if measured.is_empty() { "false here".to_string() } else { measured.join(", ") };
         let mut d = self.at_site(code, headline, said, self.doubt > 0);
         if let Some((span, label)) = about.filter(|(span, _)| *span != d.span()) {
             d = d.because(span, label);

@@ -499,8 +499,8 @@ impl Interpreter<'_, '_> {
     fn say_unbounded(&mut self) {
         if self.quiet == 0 && !self.unbounded_said {
             self.unbounded_said = true;
-            let headline = format!("more than {MOST_MOVING} things change at the same time, over a long plan");
-            self.not_analysed(Severity::Advice, headline, "from here on what they come to is not bounded");
+            let headline = format!("more than {MOST_MOVING} quantities change at the same time in a long workflow");
+            self.not_analysed(Severity::Advice, headline, "their values are unknown from here on");
         }
     }
 

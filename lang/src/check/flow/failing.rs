@@ -23,22 +23,22 @@ impl<'l> Interpreter<'l, '_> {
 
     /// Reports a `fail` that comes for certain.
     pub(super) fn fails_for_certain(&mut self, id: StepId, name: &str, condition: &Condition, facts: &AbstractState) {
-        let headline = format!("every run that comes here fails with `{name}`");
-        let mut d = Diagnostic::error(codes::RUN_FAILED, self.plan.get(id).span, headline, "raised here");
+        let headline = format!("every run that reaches this step fails with `{name}`");
+        let mut d = Diagnostic::error(codes::RUN_FAILED, self.plan.get(id).span, headline, "fails here");
         if self.doubt > 0 {
             d.severity = Severity::Warning;
         }
         for site in self.sites.iter().rev().filter(|s| s.calls).take(2) {
             d = d.because(site.span, format!("in `{}`", site.label));
         }
-        let holds = if self.eval(condition.node, facts).truth() == Some(false) { "does not hold" } else { "holds" };
+        let holds = if self.eval(condition.node, facts).truth() == Some(false) { "is false" } else { "is true" };
         let mut is =
             |c: &Comparison| format!("`{}` is {}", c.text, shown(&self.eval(c.value, facts), |v| c.unit.show(v)));
         let values: Vec<String> = condition.compared.iter().map(&mut is).collect();
         let values = if values.is_empty() { String::new() } else { format!(": {}", values.join(", ")) };
         let d = d.because(condition.span, format!("`{}` {holds}{values}", condition.text));
         let d = self.with_history(d, condition, facts);
-        self.found(d.help("change what leads here, or handle the failure"), condition.span);
+        self.found(d.help("change the steps before it, or handle the failure"), condition.span);
     }
 
     /// The condition of the innermost `if` around a step, where that does not ask for parameters alone.

@@ -55,13 +55,13 @@ impl Interpreter<'_, '_> {
     /// Reports a `hold` that cannot come to its end.
     pub(super) fn never_held(&mut self, condition: &Condition, (lasts, after): (f64, f64), limited: bool) {
         let (code, how): (Code, _) = match limited {
-            true => (codes::NOT_REACHED, "in the time given"),
-            false => (codes::WAITS_FOR_EVER, "at a time"),
+            true => (codes::NOT_REACHED, "before the timeout"),
+            false => (codes::WAITS_FOR_EVER, "without a break"),
         };
-        let headline = format!("`{}` does not hold for {} {how}", condition.text, show_duration(lasts));
-        let said = format!("it breaks off {} after it holds", show_duration(after));
+        let headline = format!("`{}` never stays true for {} {how}", condition.text, show_duration(lasts));
+        let said = format!("it becomes false {} after it became true", show_duration(after));
         let d = self.at_site(code, headline, said, self.doubt > 0);
-        let d = d.help("hold it for less, or change what breaks it off: a timer, or something that flows");
+        let d = d.help("require it for a shorter time, or change the timer or flow that ends it");
         self.found(d, condition.span);
     }
 }

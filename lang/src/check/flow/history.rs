@@ -75,7 +75,7 @@ impl Interpreter<'_, '_> {
             without.states[at] = there;
             if decides && out.len() < STEPS_SHOWN {
                 let (name, below) = (self.lab.spoken_name(owner), self.lab.spoken_name(*below));
-                out.push((self.declared_at(owner), format!("`{name}` stands {word} `{below}` from the start")));
+                out.push((self.declared_at(owner), format!("`{name}` is {word} `{below}` from the start")));
             }
         }
         out
@@ -105,9 +105,10 @@ impl Interpreter<'_, '_> {
             }
             let latest = latest.into_iter();
             said.extend(latest.map(|(span, text)| match &touched {
-                Some((mixture, reagent)) => {
-                    (span, format!("`{}` has touched `{reagent}` after this", self.lab.spoken_name(*mixture)))
-                }
+                Some((mixture, reagent)) => (
+                    span,
+                    format!("`{}` has been in contact with `{reagent}` after this", self.lab.spoken_name(*mixture)),
+                ),
                 None => (span, text),
             }));
             if said.len() == STEPS_SHOWN {

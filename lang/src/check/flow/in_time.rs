@@ -703,15 +703,15 @@ impl<'l> Interpreter<'l, '_> {
         let d = match wait.stopped {
             Some(span) => {
                 let label = self.label_at(span);
-                let headline = format!("`{label}` stops what another branch or job waits for: `{text}`");
-                Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, format!("before it has held{lasting}"))
-                    .because(place, format!("`{text}` is waited for here"))
-                    .help("let it wait for the other branch or job, or do both in one sequence")
+                let headline = format!("`{label}` prevents `{text}`, which another branch or job waits for");
+                Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, format!("before it has been true{lasting}"))
+                    .because(place, format!("another branch or job waits here for `{text}`"))
+                    .help("let it wait for the other branch or job, or put both into one `sequence`")
             }
             None => {
-                let headline = format!("`{text}` does not hold{lasting} in the time given");
-                Diagnostic::error(codes::NOT_REACHED, place, headline, "waited for here")
-                    .help("wait longer, or let the other branch or job do its part earlier")
+                let headline = format!("`{text}` does not become true{lasting} before the timeout");
+                Diagnostic::error(codes::NOT_REACHED, place, headline, "this step waits for it")
+                    .help("allow a longer timeout, or let the other branch or job act earlier")
             }
         };
         self.tell_in_time(d, wait.condition.span, lines.loose);
@@ -723,10 +723,11 @@ impl<'l> Interpreter<'l, '_> {
             own if own.is_empty() => label.to_owned(),
             own => own,
         };
-        let headline = format!("`{label}` breaks what another branch or job keeps: `{}`", condition.text);
-        let d = Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, "while it is kept")
-            .because(condition.span, "kept here".to_owned())
-            .help("let it wait for the other branch or job, or do both in one sequence");
+        let headline =
+            format!("`{label}` makes `{}` false, which another branch or job must keep true", condition.text);
+        let d = Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, "while it must stay true")
+            .because(condition.span, "must stay true from here on".to_owned())
+            .help("let it wait for the other branch or job, or put both into one `sequence`");
         self.tell_in_time(d, condition.span, self.doubt > 0);
     }
 

@@ -108,17 +108,17 @@ impl<'p> Interpreter<'p, '_> {
     fn keeps_from(&mut self, condition: &Condition, span: Span, after: f64) {
         let wait = self.site();
         let label = self.label_at(span);
-        let headline = format!("`{label}` stops what another branch or job waits for: `{}`", condition.text);
+        let headline = format!("`{label}` prevents `{}`, which another branch or job waits for", condition.text);
         let said = match after > 0.0 {
-            true => format!("{} after the wait begins, before it can be over", show_duration(after)),
+            true => format!("{} after the wait begins, before it can end", show_duration(after)),
             false => "as the wait begins".to_string(),
         };
         let mut d = Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, said);
         if after == 0.0 || self.doubt > 0 {
             d.severity = Severity::Warning;
         }
-        let d = d.because(wait, format!("`{}` is waited for here", condition.text));
-        let d = d.help("let it wait for the other branch or job, or do both in one sequence");
+        let d = d.because(wait, format!("another branch or job waits here for `{}`", condition.text));
+        let d = d.help("let it wait for the other branch or job, or put both into one `sequence`");
         self.found(d, condition.span);
     }
 

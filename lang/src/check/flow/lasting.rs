@@ -16,9 +16,10 @@ impl Interpreter<'_, '_> {
         let time = self.eval(node, facts);
         let (_, longest) = time.bounds();
         if longest < 0.0 {
-            let wrong = format!("`{}` cannot be done: a duration cannot be negative", self.label());
-            let said = format!("would take {}", show_duration(longest));
-            self.found_here(codes::TYPE_MISMATCH, wrong, said, "give a duration of 0 s or more");
+            let wrong =
+                format!("`{}` would last {}: a duration cannot be negative", self.label(), show_duration(longest));
+            let said = "negative duration".to_owned();
+            self.found_here(codes::TYPE_MISMATCH, wrong, said, "use a duration of 0 s or more");
             // Said already: when it would end is not known.
             return AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown);
         }
@@ -59,9 +60,10 @@ impl Interpreter<'_, '_> {
     pub(super) fn turns(&mut self, node: NodeId, facts: &AbstractState) -> AbstractValue {
         let times = self.eval(node, facts);
         if let Some(exact) = times.exact().filter(|n| *n < 0.0 || n.fract() != 0.0) {
-            let wrong = format!("`{}` cannot be done: how often is a whole number", self.label());
-            let said = format!("{} times", show_number(exact));
-            self.found_here(codes::TYPE_MISMATCH, wrong, said, "give a whole number, 0 or more");
+            let wrong =
+                format!("`{}` would repeat {} times: this must be a whole number", self.label(), show_number(exact));
+            let said = "not a whole number of turns".to_owned();
+            self.found_here(codes::TYPE_MISMATCH, wrong, said, "use a whole number, 0 or more");
         }
         times
     }
@@ -72,10 +74,10 @@ impl Interpreter<'_, '_> {
         if before > LONGEST_RUN || least <= LONGEST_RUN {
             return;
         }
-        let wrong = format!("`{}` ends when no run goes on any more", self.label());
-        let (end, most) = (show_duration(least), show_duration(LONGEST_RUN));
-        let said = format!("not before {end}; a run ends after {most}");
-        let mend = "make it shorter, or divide the workflow into several runs";
+        let wrong = format!("`{}` would end only after {}", self.label(), show_duration(least));
+        let most = show_duration(LONGEST_RUN);
+        let said = format!("a run stops after {most}");
+        let mend = "shorten it, or split the workflow into several runs";
         self.found_here(codes::WAITS_FOR_EVER, wrong, said, mend);
     }
 

@@ -90,7 +90,7 @@ impl Interpreter<'_, '_> {
                 Some(true) => {}
                 None => self.forks.open.push(index),
                 Some(false) => {
-                    if let Some(d) = self.unfinished(end, ended, "ends") {
+                    if let Some(d) = self.unfinished(end, ended, &format!("when `{}` ends", self.plan.workflow)) {
                         self.forks.left.insert(index, d.clone());
                         self.found(d, end.condition.span);
                     }
@@ -109,8 +109,11 @@ impl Interpreter<'_, '_> {
                 if known || self.eval(end.condition.node, facts).truth() != Some(false) {
                     continue;
                 }
-                let Some(d) = self.unfinished(end, facts, &format!("can end with `{name}`")) else { continue };
-                let d = d.because(span, format!("`{name}` ends the workflow here, and nothing handles it"));
+                let Some(d) = self.unfinished(end, facts, &format!("if `{}` fails with `{name}`", plan.workflow))
+                else {
+                    continue;
+                };
+                let d = d.because(span, format!("`{name}` ends the workflow here: no handler takes it"));
                 self.forks.left.insert(index, d.clone());
                 self.found_by_failure(d, end.condition.span);
             }
@@ -155,10 +158,10 @@ pub(super) fn on_some_way<'l, 'a>(flow: &mut Interpreter<'l, 'a>, begin: &impl F
 /// Reports a thing that is left so, with the statements at which the way there parts from others.
 fn tell(flow: &mut Interpreter<'_, '_>, end: usize, mut d: Diagnostic, way: Vec<Span>) {
     let about = flow.plan.ends[end].condition.span;
-    d.headline = d.headline.replacen(" ends, and", " can end, and", 1);
+    d.headline = d.headline.replacen("` is ", "` may be ", 1);
     for span in way.into_iter().filter(|span| !flow.in_library(*span)) {
         if !d.labels.iter().any(|l| l.span == span) {
-            d = d.because(span, "one of the ways through this leads there");
+            d = d.because(span, "one of the paths through this step leads there");
         }
     }
     flow.forks.left.insert(end, d.clone());
@@ -239,11 +242,11 @@ fn not_searched(flow: &mut Interpreter<'_, '_>, unsearched: &[usize]) {
     let more = names.len().saturating_sub(MOST_NAMED);
     names.truncate(MOST_NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    let headline = format!("not every way to the end of `{}` is followed", flow.plan.workflow);
-    let said = format!("on one of them {}{more} may be left as it should not be", names.join(", "));
+    let headline = format!("`check` did not follow every path to the end of `{}`", flow.plan.workflow);
+    let said = format!("on one of them {}{more} may be left on, open or unfinished", names.join(", "));
     let span = flow.plan.get(flow.plan.root).span;
     let d = Diagnostic::warning(codes::NOT_ANALYSED, span, headline, said)
-        .help("switch it off in a `finally` around the workflow, which every way leads through");
+        .help("switch it off in a `finally` of the workflow: every path runs it");
     flow.found(d, span);
 }
 

@@ -546,24 +546,25 @@ lab bench {
 
     #[test]
     fn needs_limits_waits_and_expectations_are_judged_by_what_is_known() {
-        let found = "need-unmet: `add 1 by c` cannot be done: it needs `count < 9`";
+        let found = "need-unmet: `add 1 by c` needs `count < 9`, which is false here";
         assert_eq!(followed("add 7 by c\nadd 1 by c"), [found]);
-        assert_eq!(followed("add 9 by c"), ["need-unmet: `add 9 by c` cannot be done: too much"]);
+        assert_eq!(followed("add 9 by c"), ["need-unmet: `add 9 by c` fails: too much"]);
         assert_eq!(
             followed("wait until c.count >= 5 timeout 1 min"),
-            ["waits-for-ever: `c.count >= 5` never comes true: nothing changes it"]
+            ["waits-for-ever: `c.count >= 5` never becomes true: nothing changes it"]
         );
-        assert_eq!(followed("add 1 by c\nexpect c.count == 4"), ["expectation-failed: `c.count == 4` does not hold"]);
+        assert_eq!(followed("add 1 by c\nexpect c.count == 4"), ["expectation-failed: `c.count == 4` is false"]);
     }
 
     #[test]
     fn on_some_ways_is_a_warning_and_loops_are_followed() {
-        let found = "need-unmet: `add 1 by c` cannot be done: it needs `count < 9`, on some ways through the plan";
+        let found =
+            "need-unmet: `add 1 by c` needs `count < 9`, which is false here, on some paths through the workflow";
         assert_eq!(followed("if more { add 7 by c }\nadd 1 by c"), [found]);
         assert_eq!(followed("repeat 4 times { add 2 by c }"), [""; 0]);
         assert_eq!(
             followed("repeat 5 times { add 2 by c }"),
-            ["need-unmet: `add 2 by c` cannot be done: it needs `count < 9`"]
+            ["need-unmet: `add 2 by c` needs `count < 9`, which is false here"]
         );
     }
 
@@ -571,7 +572,7 @@ lab bench {
     fn branches_are_followed_beside_each_other() {
         assert_eq!(
             followed("parallel { sequence { add 3 by c } sequence { wait 1 s } }\nexpect c.count == 6"),
-            ["expectation-failed: `c.count == 6` does not hold"]
+            ["expectation-failed: `c.count == 6` is false"]
         );
     }
 }

@@ -55,8 +55,8 @@ pub fn other_values(flow: &mut Interpreter<'_, '_>) -> Vec<Other> {
     }
     let most = (MOST_STEPS / flow.steps.max(1)).max(FEWEST_VALUES);
     if out.len() > most {
-        let headline = format!("{most} of {} other values of the parameters are tried", out.len());
-        let text = "branches that only the others take are not checked".to_owned();
+        let headline = format!("`check` tried only {most} of {} other values of the parameters", out.len());
+        let text = "branches that only the other values take are not checked".to_owned();
         let span = flow.plan.get(flow.plan.root).span;
         flow.found(Diagnostic::warning(codes::NOT_ANALYSED, span, headline, text), span);
     }
@@ -68,7 +68,7 @@ pub fn other_values(flow: &mut Interpreter<'_, '_>) -> Vec<Other> {
 /// is left on at the end.
 pub fn said_of(lab: &Elaborator<'_>, other: &Other, found: Vec<Diagnostic>) -> Vec<Diagnostic> {
     let p = &lab.params[other.param as usize];
-    let help = format!("so it is with `{}` at {}", p.name, p.unit.show(other.value));
+    let help = format!("this also happens with `{}` = {}", p.name, p.unit.show(other.value));
     let within = |span: Span| {
         other.done.iter().any(|block| block.file == span.file && block.start <= span.start && span.end <= block.end)
     };

@@ -46,7 +46,7 @@ impl Finding {
     pub fn only_where_reported(&mut self, names: &[String]) {
         let names: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
         self.diagnostic.severity = Severity::Warning;
-        self.diagnostic.help.push(format!("so it is where a device reports {}", names.join(" or ")));
+        self.diagnostic.help.push(format!("this happens if a device reports {}", names.join(" or ")));
     }
 
     /// The statement it is at, and what it is about.
@@ -89,7 +89,7 @@ impl Finding {
     /// The same on some of the ways that lead there.
     pub(super) fn on_some_ways(mut self) -> Finding {
         self.diagnostic.severity = Severity::Warning;
-        self.diagnostic.headline.push_str(", on some ways through the plan");
+        self.diagnostic.headline.push_str(", on some paths through the workflow");
         self
     }
 
@@ -161,22 +161,22 @@ impl Interpreter<'_, '_> {
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &need.refusal {
             // The name that every need without one of its own has says nothing.
-            Some(r) if r.failure == UNNAMED => format!("`{label}` cannot be done"),
-            Some(r) => format!("`{label}` cannot be done: {}", r.failure.replace('_', " ")),
-            None => format!("`{label}` cannot be done: it needs `{}`", need.text),
+            Some(r) if r.failure == UNNAMED => format!("`{label}` needs `{}`, which is false here", need.text),
+            Some(r) => format!("`{label}` fails: {}", r.failure.replace('_', " ")),
+            None => format!("`{label}` needs `{}`, which is false here", need.text),
         };
-        self.demand(what, "this cannot be done", need, facts, (some, None));
+        self.demand(what, "this step fails", need, facts, (some, None));
     }
 
     /// Something presumed that holds on no way.
     pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &AbstractState, warns: bool) {
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &presumed.refusal {
-            Some(r) => format!("`{label}` is out of place: {}", r.failure.replace('_', " ")),
-            None => format!("`{label}` is out of place: it presumes `{}`", presumed.text),
+            Some(r) => format!("`{label}` has no effect: {}", r.failure.replace('_', " ")),
+            None => format!("`{label}` has no effect: it presumes `{}`, which was never true", presumed.text),
         };
         let severity = warns.then_some(Severity::Warning);
-        self.demand(what, "this is out of place", presumed, facts, (false, severity));
+        self.demand(what, "this step is unnecessary", presumed, facts, (false, severity));
     }
 
     /// A demand that does not hold: in its own words where it has them, which a label at the step then says the consequence of.
@@ -195,13 +195,13 @@ impl Interpreter<'_, '_> {
         let asked = failing.first().copied().unwrap_or(need);
         let words = self.worded(need, facts);
         let what = if words.is_empty() { what } else { words.join(", ") };
-        let headline = if some { format!("{what}, on some ways through the plan") } else { what };
+        let headline = if some { format!("{what}, on some paths through the workflow") } else { what };
         let measured = if words.is_empty() { self.measured(asked, facts) } else { vec![so.to_owned()] };
         let named = !failing.is_empty() && failing.len() < need.each.len();
         let said = match (named, measured.is_empty()) {
-            (true, true) => format!("not for {}", listed(&failing)),
-            (true, false) => format!("not for {}: {}", listed(&failing), measured.join(", ")),
-            (false, true) => "not possible".to_string(),
+            (true, true) => format!("fails for {}", listed(&failing)),
+            (true, false) => format!("fails for {}: {}", listed(&failing), measured.join(", ")),
+            (false, true) => "this step fails".to_string(),
             (false, false) => measured.join(", "),
         };
         let mut d = self.at_site(code, headline, said, some);
@@ -268,8 +268,11 @@ impl Interpreter<'_, '_> {
         let (name, span) = (self.lab.spoken_name(about), self.declared_at(about));
         let what = condition.refusal.as_ref().map_or(condition.text.clone(), |r| r.failure.replace('_', " "));
         let words = self.worded(condition, facts);
-        let said = if words.is_empty() { self.measured(condition, facts) } else { words.clone() }.join(", ");
-        let mut d = Diagnostic::error(code, span, format!("`{name}` cannot start like this: {what}"), said);
+        let (headline, said) = match words.is_empty() {
+            true => (format!("`{name}` is invalid at the start: {what}"), self.measured(condition, facts).join(", ")),
+            false => (words.join(", "), "true from the start".to_owned()),
+        };
+        let mut d = Diagnostic::error(code, span, headline, said);
         if span != condition.span && (words.is_empty() || !self.in_library(condition.span)) {
             d = d.because(condition.span, format!("needed here: `{}`", condition.text));
         }
@@ -296,8 +299,8 @@ impl Interpreter<'_, '_> {
     /// An expectation that cannot hold.
     pub fn unexpected(&mut self, condition: &Condition, facts: &AbstractState) {
         let some = self.doubt > 0;
-        let ways = if some { ", on some ways through the plan" } else { "" };
-        let headline = format!("`{}` does not hold{ways}", condition.text);
+        let ways = if some { ", on some paths through the workflow" } else { "" };
+        let headline = format!("`{}` is false{ways}", condition.text);
         let measured = self.measured(condition, facts);
         let said = if measured.is_empty() { "expected here".to_string() } else { measured.join(", ") };
         let (code, headline) = match self.not_made(condition, facts) {
@@ -321,10 +324,14 @@ impl Interpreter<'_, '_> {
         let (span, said) = changed.into_iter().next()?;
         let name = self.lab.spoken_name(end.instance);
         let how = condition.refusal.as_ref().map_or("unfinished".to_string(), |r| r.failure.replace('_', " "));
-        let headline = format!("`{}` {ends}, and `{name}` is {how}", self.plan.workflow);
+        let words = self.worded(condition, ended);
+        let headline = match words.is_empty() {
+            true => format!("`{name}` is {how} {ends}"),
+            false => format!("{} {ends}", words.join(", ")),
+        };
         let mut d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
         if !self.in_library(condition.span) {
-            d = d.because(condition.span, format!("looked for here: `{}`", condition.text));
+            d = d.because(condition.span, format!("required here at the end: `{}`", condition.text));
         }
         d.help.extend(condition.advice());
         Some(d)
@@ -332,12 +339,12 @@ impl Interpreter<'_, '_> {
 
     /// A body fails for certain with a failure that the text writes, however often a handler begins it again.
     pub(super) fn retried_in_vain(&mut self, name: &str, place: Span) {
-        let headline = format!("the steps that `retry` begins again fail with `{name}` each time");
-        let mut d = Diagnostic::error(codes::RUN_FAILED, place, headline, format!("`{name}` is raised in every turn"));
+        let headline = format!("`retry` cannot help: its steps fail with `{name}` every time");
+        let mut d = Diagnostic::error(codes::RUN_FAILED, place, headline, format!("fails with `{name}` on every try"));
         if self.doubt > 0 {
             d.severity = Severity::Warning;
         }
-        let d = d.help("change in the handler what the failure comes of, or raise it under a condition");
+        let d = d.help("remove the cause of the failure in the handler, or raise it only under a condition");
         self.found(d, place);
     }
 
@@ -355,13 +362,13 @@ impl Interpreter<'_, '_> {
         let absent = self.not_made(condition, after);
         let text = &condition.text;
         let (code, headline) = match (&absent, still, in_time) {
-            (Some(absent), ..) => (codes::NEVER_MADE, format!("`{text}` never comes true: {absent}")),
-            (None, true, _) => (codes::WAITS_FOR_EVER, format!("`{text}` never comes true: nothing changes it")),
-            (None, false, true) => (codes::NOT_REACHED, format!("`{text}` cannot come true in the time given")),
+            (Some(absent), ..) => (codes::NEVER_MADE, format!("`{text}` never becomes true: {absent}")),
+            (None, true, _) => (codes::WAITS_FOR_EVER, format!("`{text}` never becomes true: nothing changes it")),
+            (None, false, true) => (codes::NOT_REACHED, format!("`{text}` cannot become true before the timeout")),
             (None, false, false) => (codes::NOT_REACHED, format!("`{text}` is never reached")),
         };
         let measured = self.measured(condition, after);
-        let said = if measured.is_empty() { "waited for here".to_string() } else { measured.join(", ") };
+        let said = if measured.is_empty() { "this step waits for it".to_string() } else { measured.join(", ") };
         let d = self.at_site(code, headline, said, self.doubt > 0);
         let d = self.with_history(d, condition, before);
         let d = match absent.is_some() {
@@ -378,11 +385,11 @@ impl Interpreter<'_, '_> {
             return;
         }
         let some = some || self.doubt > 0;
-        let ways = if some { ", on some ways through the plan" } else { "" };
-        let headline = format!("no job `{job}` has begun here{ways}");
-        let d = self.at_site(codes::JOB_NOT_BEGUN, headline, "nothing to wait for: fails with `job`".to_string(), some);
+        let ways = if some { ", on some paths through the workflow" } else { "" };
+        let headline = format!("job `{job}` has not started at this point{ways}");
+        let d = self.at_site(codes::JOB_NOT_BEGUN, headline, "no job to wait for: fails with `job`".to_string(), some);
         let about = d.span();
-        let d = d.help(format!("start `{job}` on every way that leads here, or wait for it where it was started"));
+        let d = d.help(format!("start `{job}` on every path to this point, or `await` it where it was started"));
         let turn = self.turning > 0;
         self.found_on(d, about, open, turn);
     }
@@ -395,7 +402,9 @@ impl Interpreter<'_, '_> {
             some && self.eval(c.value, facts).bounds() == (0.0, 0.0)
         });
         let name = &self.lab.tables.species.get(s).name;
-        none.then(|| format!("nothing brings or makes `{name}` in `{}`", self.lab.spoken_name(mixture)))
+        none.then(|| {
+            format!("no step adds `{name}` to `{}`, and no reaction makes it there", self.lab.spoken_name(mixture))
+        })
     }
 
     /// Says where to look for a salt of which nothing is left as it has dissolved.
@@ -411,7 +420,7 @@ impl Interpreter<'_, '_> {
             amounts.filter_map(|(key, _)| key.matter()).map(|s| species.get(s)).find(|s| !s.dissolves.is_empty());
         let Some(salt) = salt else { return d };
         let ions: Vec<String> = salt.dissolves.iter().map(|(ion, _)| format!("`{}`", species.get(*ion).name)).collect();
-        d.help(format!("once dissolved, `{}` counts as its ions: ask for {}", salt.name, ions.join(" or ")))
+        d.help(format!("once dissolved, `{}` counts as its ions: use {}", salt.name, ions.join(" or ")))
     }
 
     /// Adds the reactions that would make what is missing.
@@ -421,11 +430,11 @@ impl Interpreter<'_, '_> {
         let all = self.lab.tables.reactions.iter().filter(|r| r.products.iter().any(|(p, _)| p == s));
         let makers: Vec<_> = all.take(STEPS_SHOWN).collect();
         for r in &makers {
-            d = d.because(r.span, format!("`{}` makes it, and its reactants never meet there", r.name));
+            d = d.because(r.span, format!("`{}` makes it, but its reactants never meet there", r.name));
         }
         match makers.is_empty() {
-            true => d.help(format!("no reaction makes `{name}`: declare it, or ask for what is made")),
-            false => d.help(format!("bring together what makes `{name}`, or ask for what is made")),
+            true => d.help(format!("no reaction makes `{name}`: declare one, or use a species that is made")),
+            false => d.help(format!("mix the reactants of `{name}`, or use a species that is made")),
         }
     }
 
@@ -433,14 +442,14 @@ impl Interpreter<'_, '_> {
     pub fn dead_branches(&mut self) {
         for (span, (text, seen, otherwise)) in std::mem::take(&mut self.branches) {
             let dead = match (seen.contains(&true), seen.contains(&false)) {
-                (false, true) => "what follows is never done",
-                (true, false) if otherwise => "what follows `else` is never done",
+                (false, true) => "this branch never runs",
+                (true, false) if otherwise => "the `else` branch never runs",
                 _ => continue,
             };
-            let comes = if seen.contains(&true) { "always" } else { "never" };
-            let headline = format!("`{text}` {comes} holds: constants decide it");
+            let comes = if seen.contains(&true) { "always true" } else { "always false" };
+            let headline = format!("`{text}` is {comes}: it depends on constants only");
             let d = Diagnostic::warning(codes::DEAD_BRANCH, span, headline, dead);
-            self.found(d.help("take the branch out, or make a parameter of the workflow what should decide"), span);
+            self.found(d.help("remove the branch, or make the deciding value a parameter of the workflow"), span);
         }
     }
 
@@ -453,11 +462,11 @@ impl Interpreter<'_, '_> {
             return;
         }
         let open = some.then(|| self.ways.meetings());
-        let ways = if some { ", on some ways through the plan" } else { "" };
-        let headline = format!("`{label}` takes more from `{name}` than it holds{ways}");
+        let ways = if some { ", on some paths through the workflow" } else { "" };
+        let headline = format!("`{label}` removes more from `{name}` than it holds{ways}");
         let said = match fraction.is_finite() {
-            true => format!("{} times what there is", matterix_ir::quantity::show_number(fraction)),
-            false => "there is nothing".to_owned(),
+            true => format!("{} times the available amount", matterix_ir::quantity::show_number(fraction)),
+            false => "it is empty".to_owned(),
         };
         let d = self.at_site(codes::TRANSFER_FRACTION, headline, said, some || self.doubt > 0);
         let turn = self.turning > 0;
@@ -467,14 +476,14 @@ impl Interpreter<'_, '_> {
     /// Events set each other off for certain, more often at one moment than a run follows; this is one of them.
     pub(super) fn cascades(&mut self, event: u32) {
         let event = &self.events[event as usize];
-        let headline = format!("`{}` is one of events that set each other off at one moment without end", event.name);
+        let headline = format!("`{}` and other events trigger each other endlessly at one moment", event.name);
         let at = if self.in_library(event.span) { self.site() } else { event.span };
-        let mut d = Diagnostic::error(codes::EVENT_CASCADE, at, headline, "fires again and again");
+        let mut d = Diagnostic::error(codes::EVENT_CASCADE, at, headline, "triggers again and again");
         d.severity = severity(codes::EVENT_CASCADE, self.doubt > 0);
         if at != self.site() {
-            d = d.because(self.site(), "comes about in this step");
+            d = d.because(self.site(), "happens in this step");
         }
-        let d = d.help("give one of them a condition that stays false once the other has fired");
+        let d = d.help("give one of them a condition that stays false after the other one");
         self.found(d, event.span);
     }
 
@@ -482,13 +491,13 @@ impl Interpreter<'_, '_> {
     pub(super) fn used_up(&mut self, amount: u32, facts: &AbstractState) {
         let name = &self.lab.states[amount as usize].name;
         let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
-        let headline = format!("`{name}` is used up during `{label}`, and a law goes on taking it");
+        let headline = format!("`{name}` runs out during `{label}`, but a law keeps removing it");
         let said = match facts.time.exact() {
-            Some(time) => format!("none is left after {}", matterix_ir::quantity::show_duration(time)),
-            None => "none is left before it ends".to_string(),
+            Some(time) => format!("empty after {}", matterix_ir::quantity::show_duration(time)),
+            None => "empty before the step ends".to_string(),
         };
         let d = self.at_site(codes::TRANSFER_FRACTION, headline, said, self.doubt > 0);
-        let d = d.help("stop it before that, take a larger vessel, or give the law a `while` that ends it");
+        let d = d.help("stop it earlier, use a larger vessel, or give the law a `while` that ends it");
         let about = d.span();
         self.found(d, about);
     }
@@ -498,9 +507,8 @@ impl Interpreter<'_, '_> {
         let of = self.mixtures.iter().find_map(|all| all.iter().find(|(_, s)| *s == state));
         let name = of.map_or_else(String::new, |(key, _)| self.lab.spoken_name(key.instance));
         let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
-        let headline = format!("`{name}` is empty, and a law takes from it during `{label}`");
-        let d =
-            self.at_site(codes::TRANSFER_FRACTION, headline, "there is nothing to take".to_string(), self.doubt > 0);
+        let headline = format!("a law removes liquid from `{name}` during `{label}`, but it is empty");
+        let d = self.at_site(codes::TRANSFER_FRACTION, headline, "the source is empty".to_string(), self.doubt > 0);
         let d = d.help("fill it first, or give the law a `while` that waits for it");
         let about = d.span();
         self.found(d, about);
@@ -520,7 +528,7 @@ impl Interpreter<'_, '_> {
         let Some(id) = self.lab.mixtures.get(to as usize) else { return };
         let (member, to) = (key.member.clone(), self.lab.spoken_name(*id));
         let from = self.lab.spoken_name(key.instance);
-        let headline = format!("`{member}` goes with what `{from}` holds, and `{to}` has no place for it");
+        let headline = format!("`{to}` has no `{member}`: the `{member}` of the contents of `{from}` would be lost");
         let d = self.at_site(codes::BALANCE_BREACH, headline, "would be lost".to_string(), self.doubt > 0);
         let d = d.help(format!("give `{to}` contents that have `{member}` as well"));
         let about = d.span();
@@ -546,7 +554,7 @@ impl Interpreter<'_, '_> {
             let show = |k: &AbstractValue| shown(k, |v| c.unit.show(v));
             let limits = match (low, high) {
                 (Some(l), Some(_)) if c.low == c.high => format!("must be {}", show(&l)),
-                (Some(l), Some(h)) => format!("allowed is {} .. {}", show(&l), show(&h)),
+                (Some(l), Some(h)) => format!("the allowed range is {} .. {}", show(&l), show(&h)),
                 (Some(l), None) => format!("{} {}", if c.strict { "must be more than" } else { "at least" }, show(&l)),
                 (None, Some(h)) => format!("{} {}", if c.strict { "must be less than" } else { "at most" }, show(&h)),
                 (None, None) => continue,
@@ -610,6 +618,6 @@ pub(super) fn shown(value: &AbstractValue, show: impl Fn(f64) -> String) -> Stri
         }
         AbstractValue::Range(low, _, _) if low.is_finite() => format!("{} or more", show(*low)),
         AbstractValue::Range(_, high, _) if high.is_finite() => format!("{} or less", show(*high)),
-        AbstractValue::Range(..) => "not known".to_string(),
+        AbstractValue::Range(..) => "unknown".to_string(),
     }
 }

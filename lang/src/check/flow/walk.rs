@@ -32,9 +32,11 @@ impl<'l> Interpreter<'l, '_> {
     pub fn walk(&mut self, id: StepId, facts: AbstractState) -> Option<AbstractState> {
         self.steps += 1;
         if self.steps > MOST_STEPS {
-            let headline =
-                format!("`{}` is followed up to here: it has more than {MOST_STEPS} steps", self.plan.workflow);
-            self.not_analysed(Severity::Warning, headline, "nothing is known from here on");
+            let headline = format!(
+                "`check` followed `{}` only up to here: it has more than {MOST_STEPS} steps",
+                self.plan.workflow
+            );
+            self.not_analysed(Severity::Warning, headline, "later steps are not checked");
             return None;
         }
         let node = self.plan.get(id);
@@ -543,8 +545,8 @@ impl<'l> Interpreter<'l, '_> {
     /// Says that more turns of a loop are not followed one by one.
     fn turns_not_followed(&mut self, body: StepId) {
         self.durations_unknown(body);
-        let headline = format!("the turns of this loop are followed one by one up to {MOST_TURNS} of them");
-        self.not_analysed(Severity::Advice, headline, "what further turns change is unknown after it");
+        let headline = format!("`check` followed only the first {MOST_TURNS} turns of this loop one by one");
+        self.not_analysed(Severity::Advice, headline, "values that later turns change are unknown after it");
     }
 
     /// A turn of a loop.

@@ -96,7 +96,7 @@ impl Walk<'_, '_> {
             for i in found {
                 let hazard = &self.hazards.all[i];
                 if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
-                    let d = self.hazard(hazard, world, held.span, "measured out here");
+                    let d = self.hazard(hazard, world, held.span, "dispensed here");
                     self.tell(i, d);
                 }
             }
@@ -127,8 +127,8 @@ impl Walk<'_, '_> {
             let hazard = &self.hazards.all[i];
             // What is so from the start stands where the lab puts it.
             let (place, said) = match self.places.len() {
-                1 => (self.declared_at(hazard), "so from the start"),
-                _ => (self.place(), "brings it about"),
+                1 => (self.declared_at(hazard), "true from the start"),
+                _ => (self.place(), "this step causes it"),
             };
             let law = law.filter(|_| hazard.watched != Watched::Steps);
             let mut d =
@@ -188,7 +188,7 @@ impl Walk<'_, '_> {
         if !words.is_empty() {
             d.headline = words;
         }
-        d = d.because(place, "comes together here");
+        d = d.because(place, "mixed here");
         self.tell(i, d);
     }
 
@@ -198,8 +198,7 @@ impl Walk<'_, '_> {
             return self.used_after(i, world);
         }
         if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
-            let said =
-                if matches!(hazard.watched, Watched::Transfer(..)) { "comes together here" } else { "used here" };
+            let said = if matches!(hazard.watched, Watched::Transfer(..)) { "mixed here" } else { "used here" };
             let d = self.hazard(hazard, world, self.place(), said);
             self.hazards.present.insert(i);
             self.tell(i, d);
@@ -263,7 +262,7 @@ impl Walk<'_, '_> {
             d = d.help(help.clone());
         }
         if !hazard.grave && in_words {
-            d = d.help(format!("if this is meant, say so: `allow {} \"why\"`", hazard.name));
+            d = d.help(format!("if this is intended, write `allow {} \"why\"`", hazard.name));
         }
         d
     }

@@ -201,9 +201,9 @@ pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &MixtureState, times: i
 }
 
 fn not_followed(span: Span) -> Diagnostic {
-    let headline = "concurrent steps can run in too many orders to follow them all";
-    Diagnostic::warning(codes::NOT_ANALYSED, span, headline, "other orders are not screened")
-        .help("let steps that bring something into one vessel and take it out again wait for each other")
+    let headline = "concurrent steps can run in too many orders to check them all";
+    Diagnostic::warning(codes::NOT_ANALYSED, span, headline, "some orders are not screened")
+        .help("let the steps that fill and empty one vessel wait for each other")
 }
 
 struct Search<'s, 'w, 'v, 'a> {
@@ -547,6 +547,6 @@ fn in_some_order(d: &mut Diagnostic) {
     d.severity = Severity::Warning;
     let headline = d.headline.replacen(" may come together", " come together", 1);
     d.headline = format!("in some order of the steps, {headline}");
-    let help = "concurrent steps run in any order: let one wait for the other, or claim what both use";
+    let help = "concurrent steps run in any order: let one wait for the other, or `claim` the thing that both use";
     d.help.insert(0, help.to_owned());
 }

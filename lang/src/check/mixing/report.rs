@@ -9,7 +9,7 @@ use crate::declare::SpeciesId;
 use crate::declare::compatibility::{Intended, Match, Party, Presence, intended};
 
 /// What every finding of the screen says of itself.
-const SCREEN: &str = "this is a screen by classes of substances, no safety assessment: what it does not find may be dangerous all the same";
+const SCREEN: &str = "this screens classes of substances and is no safety assessment: a mixture that it does not report may still be dangerous";
 
 /// Two species that come together.
 struct Meeting<'e> {
@@ -98,7 +98,7 @@ impl Walk<'_, '_> {
         let meets = if certain { "come together" } else { "may come together" };
         let headline = format!("`{x}` and `{y}` {meets} in `{vessel}`: {}", found.pair.words());
         let label = match b.1.residue {
-            true => format!("`{x}` meets what is left of `{y}`"),
+            true => format!("`{x}` meets traces of `{y}`"),
             false => format!("`{x}` meets `{y}` here"),
         };
         let mut d = Diagnostic::error(codes::INCOMPATIBLE_MIX, place, headline, label);
@@ -116,7 +116,7 @@ impl Walk<'_, '_> {
             (Some(p), Some(q)) => format!("{}, {}", belongs(&x, p), belongs(&y, q)),
             (Some(p), None) => belongs(&x, p),
             (None, Some(q)) => belongs(&y, q),
-            (None, None) => "published as a pair".to_string(),
+            (None, None) => "this pair is published as incompatible".to_string(),
         };
         d = d.help(format!("{why} ({})", found.pair.source));
         let unknown: Vec<String> = world
@@ -125,9 +125,12 @@ impl Walk<'_, '_> {
             .map(|(p, _)| format!("`{}`", self.species(p.0)))
             .collect();
         if !unknown.is_empty() {
-            d = d.help(format!("of {} there, the screen knows no structure and no group", unknown.join(", ")));
+            d = d.help(format!(
+                "the screen has no structure or group for {}, so it cannot judge them",
+                unknown.join(", ")
+            ));
         }
-        d.help(format!("if this is meant, say so: `allow incompatible {x} with {y} \"why\"`")).help(SCREEN)
+        d.help(format!("if this is intended, write `allow incompatible {x} with {y} \"why\"`")).help(SCREEN)
     }
 
     /// Judges what a species does to the wall around it.
@@ -148,14 +151,15 @@ impl Walk<'_, '_> {
         let wall = tables.screen.title(Party::Material(material)).unwrap_or("something else");
         let (name, vessel) = (self.species(s), self.vessel(m));
         let headline = format!("`{name}` attacks `{vessel}`, which is made of {wall}: {}", found.pair.words());
-        let mut d = Diagnostic::error(codes::MATERIAL_ATTACKED, place, headline, format!("`{name}` gets there"));
+        let mut d =
+            Diagnostic::error(codes::MATERIAL_ATTACKED, place, headline, format!("`{name}` reaches the wall here"));
         if !entry.certain || found.pair.severity() == Severity::Warning {
             d.severity = Severity::Warning;
         }
         d = self.history(d, &name, entry, place);
         let belongs = match tables.screen.title(found.b) {
-            Some(title) => format!("`{name}` is one of the {title}, which are not for {wall}"),
-            None => format!("`{name}` is not for {wall}"),
+            Some(title) => format!("`{name}` is one of the {title}, which attack {wall}"),
+            None => format!("`{name}` attacks {wall}"),
         };
         let d =
             d.help(format!("{belongs} ({})", found.pair.source)).help("use a vessel of another material").help(SCREEN);

@@ -122,19 +122,19 @@ fn within(times: &Times<'_>, step: StepId, outer: StepId) -> bool {
 fn finding(times: &Times<'_>, name: &str, first: Begun, again: Begun, sure: bool) -> Diagnostic {
     let own = |step: StepId| times.plan.get(show::own(times.plan, &times.timing, step));
     let may = if sure { "is" } else { "may be" };
-    let headline = format!("the job `{name}` {may} begun again while it still runs");
+    let headline = format!("job `{name}` {may} started again while it still runs");
     let lasts = times.timing.visit(first.body).map_or(0.0, |v| v.lasts.min);
-    let takes = if lasts > 0.0 { format!(", and takes at least {}", show_duration(lasts)) } else { String::new() };
+    let takes = if lasts > 0.0 { format!("; it takes at least {}", show_duration(lasts)) } else { String::new() };
     let (begun, place) = (own(first.step), own(again.step));
     let mut d = if first.step == again.step {
-        let text = format!("begun in each turn of the loop{takes}: fails with `job`");
+        let text = format!("started in each turn of the loop{takes}: fails with `job`");
         Diagnostic::error(codes::JOB_STILL_RUNNING, place.span, headline, text)
     } else {
         let d = Diagnostic::error(codes::JOB_STILL_RUNNING, place.span, headline, "fails with `job`");
-        d.because(begun.span, format!("begun here{takes}"))
+        d.because(begun.span, format!("started here{takes}"))
     };
     if !sure {
         d.severity = Severity::Warning;
     }
-    d.help(format!("`await {name}` before it is begun again, or give one of them another name"))
+    d.help(format!("`await {name}` before starting it again, or give one of the jobs another name"))
 }

@@ -89,8 +89,8 @@ pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -
         }
         if search.left == 0 {
             let own = show::own(times.plan, &times.timing, nested[start].step);
-            let text = "the search for claims that wait for each other ends here";
-            found.push(spent(times.plan.get(own).span, "not all claims are compared with each other", text));
+            let text = "the search for deadlocks ends here";
+            found.push(spent(times.plan.get(own).span, "`check` did not compare all claims with each other", text));
             break;
         }
     }
@@ -319,7 +319,7 @@ fn places(times: &Times<'_>, all: &[Told]) -> Vec<(Span, String)> {
             out.push((span, format!("{holds}waits {}", told.waits)));
         }
         for told in all {
-            let blocks = told.holds.iter().map(|(block, _)| (own(*block), "held from here on".to_owned()));
+            let blocks = told.holds.iter().map(|(block, _)| (own(*block), "claimed from here on".to_owned()));
             out.extend(blocks.chain([(own(told.step), "waits here".to_owned())]));
         }
     } else {
@@ -352,7 +352,7 @@ fn finding(times: &Times<'_>, nested: &[Wait], circle: &[usize], name: &dyn Fn(I
         (false, true) => jobs.join(" and "),
         (false, false) => format!("{} and a claim of {things}", jobs.join(" and ")),
     };
-    let headline = format!("{all}{can} wait for each other for ever");
+    let headline = format!("{all}{can} wait for each other forever");
     let mut d = Diagnostic::error(codes::DEADLOCK, span, headline, text);
     if !sure {
         d.severity = Severity::Warning;
@@ -361,7 +361,9 @@ fn finding(times: &Times<'_>, nested: &[Wait], circle: &[usize], name: &dyn Fn(I
         d = d.because(span, text);
     }
     d.help(match jobs.is_empty() {
-        true => "claim everything that is needed together in one `claim`, or everywhere in the same order",
-        false => "wait for the job outside of the `claim`, or start it inside, where it has what the block has claimed",
+        true => "claim all of them in one `claim`, or in the same order everywhere",
+        false => {
+            "wait for the job outside of the `claim`, or start it inside the block, where it may use the claimed things"
+        }
     })
 }

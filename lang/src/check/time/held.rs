@@ -169,11 +169,11 @@ pub(super) fn finding(times: &Times<'_>, hold: &Use, used: &Use, sure: bool, nam
     let own = |u: &Use| times.plan.get(show::own(times.plan, &times.timing, u.step));
     let (block, step) = (own(hold), own(used));
     let may = if sure { "uses" } else { "may use" };
-    let headline = format!("`{}` {may} `{name}` while another branch or job has claimed it", step.label);
+    let headline = format!("`{}` {may} `{name}` while another branch or job holds a claim on it", step.label);
     let mut d = Diagnostic::error(codes::CLAIMED_TWICE, step.span, headline, format!("uses `{name}`"))
-        .because(block.span, format!("holds `{name}` to the end of this block"));
+        .because(block.span, format!("claims `{name}` until the end of this block"));
     if !sure {
         d.severity = Severity::Warning;
     }
-    d.help(format!("put it into `claim {name} {{ }}` as well, so that they take turns, or do one after the other"))
+    d.help(format!("put it into `claim {name} {{ }}` too, so that they take turns, or put both into one `sequence`"))
 }

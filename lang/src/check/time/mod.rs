@@ -66,8 +66,8 @@ pub fn plan(subject: Subject<'_, '_>, told: Told<'_>) -> Vec<Diagnostic> {
     found.extend(again::findings(&times, &known));
     found.extend(deadlock::findings(&times, &name));
     if times.work.get() > MOST_WORK {
-        let text = "its steps are compared with each other up to a limit";
-        found.push(spent(plan.get(plan.root).span, "not all times of this workflow are compared", text));
+        let text = "the workflow has too many steps";
+        found.push(spent(plan.get(plan.root).span, "`check` did not compare all times of this workflow", text));
     }
     found
 }
@@ -101,7 +101,7 @@ fn timed<'p>(plan: &'p Plan, known: &Known<'_>) -> (Vec<Diagnostic>, Times<'p>) 
 /// The finding that a limit of an analysis was reached.
 fn spent(place: Span, headline: &str, text: &str) -> Diagnostic {
     Diagnostic::warning(codes::NOT_ANALYSED, place, headline, text)
-        .help("divide the workflow into several, or say `claim` around what must not overlap")
+        .help("split the workflow, or put steps that must not overlap into `claim`")
 }
 
 /// Least times from a point to all others, s, with what holds in some scopes.
@@ -268,6 +268,6 @@ lab bench {
             claim a { wait 1 s; claim b { work 1 s by b } }
             claim b { wait 1 s; claim a { work 1 s by a } }
         }";
-        assert_eq!(timed(cross), ["deadlock: claims of `b` and `a` can wait for each other for ever"]);
+        assert_eq!(timed(cross), ["deadlock: claims of `b` and `a` can wait for each other forever"]);
     }
 }

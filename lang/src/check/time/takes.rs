@@ -42,20 +42,20 @@ fn finding(
             let (how, time) = if real.min > bounds.max { ("at least", real.min) } else { ("at most", real.max) };
             let time = show_duration(time);
             (
-                format!("the steps of `{what}` take {how} {time}, its bounds are {allowed}"),
-                "give `takes` bounds that its steps can keep, or change the steps",
+                format!("the steps of `{what}` take {how} {time}, but its bounds are {allowed}"),
+                "widen the bounds in `takes`, or change the steps",
             )
         }
         _ if outside(nominal) => {
             let time = show_duration(if nominal.min > bounds.max { nominal.min } else { nominal.max });
             (
-                format!("`{what}` takes {time}, its bounds are {allowed}"),
-                "change the parameter that its time follows from, or the bounds in its `takes`",
+                format!("`{what}` takes {time}, but its bounds are {allowed}"),
+                "change the parameter that sets its time, or the bounds in its `takes`",
             )
         }
         _ => return None,
     };
     let own = show::own(plan, timing, step);
-    let label = if own == step { "not within its bounds" } else { "done here" };
+    let label = if own == step { "outside its bounds" } else { "called here" };
     Some(Diagnostic::error(codes::TAKES_CONTRADICTED, plan.get(own).span, headline, label).help(help))
 }

@@ -58,7 +58,7 @@ pub(super) fn findings(
         clashes.into_iter().map(|(a, b, sure)| finding(times, a, b, sure, &name(a.instance))).collect();
     found.extend(unfinished.map(|at| {
         let own = times.plan.get(show::own(times.plan, &times.timing, at.step));
-        let headline = format!("not all uses of `{}` are compared with each other", name(at.instance));
+        let headline = format!("`check` did not compare all uses of `{}` with each other", name(at.instance));
         spent(own.span, &headline, "the search for simultaneous uses ends here")
     }));
     found
@@ -238,5 +238,5 @@ fn finding(times: &Times<'_>, a: &Use, b: &Use, sure: bool, name: &str) -> Diagn
             }
         }
     }
-    d.help(format!("put each into `claim {name} {{ }}`, so that they take turns, or do one after the other"))
+    d.help(format!("put each into `claim {name} {{ }}`, so that they take turns, or put both into one `sequence`"))
 }

@@ -54,14 +54,14 @@ fn finding(plan: &Plan, timing: &Timing, cycle: &[Edge], blamed: &Edge) -> Diagn
         ),
         Why::Promised(_) => (
             codes::TAKES_CONTRADICTED,
-            format!("the steps of `{}` take at least {spent}, its bounds allow at most {allowed}", node.label),
-            "not within its bounds".to_owned(),
+            format!("the steps of `{}` take at least {spent}, but its bounds allow at most {allowed}", node.label),
+            "outside its bounds".to_owned(),
             "promise",
         ),
         _ => (
             codes::WINDOW_UNMEETABLE,
-            format!("`{}` always comes too late: at least {spent} pass before it", node.label),
-            format!("must begin within {allowed}"),
+            format!("`{}` always starts too late: at least {spent} pass before it", node.label),
+            format!("must start within {allowed}"),
             "late",
         ),
     };
@@ -73,15 +73,15 @@ fn finding(plan: &Plan, timing: &Timing, cycle: &[Edge], blamed: &Edge) -> Diagn
     for (step, seconds, why) in causes(plan, timing, cycle, own) {
         let time = show_duration(seconds);
         let text = match why {
-            Why::NotBefore(_) => format!("not before {time} have passed"),
+            Why::NotBefore(_) => format!("starts only after {time}"),
             _ => format!("takes at least {time}"),
         };
         d = d.because(plan.get(step).span, text);
     }
     let help = match blamed.reason.why {
-        Why::Timeout(_) => "wait longer, or for less",
-        Why::Promised(_) => "give `takes` bounds that its steps can keep, or change the steps",
-        _ => "allow more time, or do what takes long before or after the window",
+        Why::Timeout(_) => "allow a longer timeout, or wait for less",
+        Why::Promised(_) => "widen the bounds in `takes`, or change the steps",
+        _ => "allow more time, or move the long steps before or after the window",
     };
     d.help(help)
 }

@@ -20,7 +20,7 @@ const TABLE: &[(&str, &str, Severity)] = &[
     ("gas", "gas", Severity::Warning),
     ("toxic_solution", "a toxic substance goes into solution", Severity::Warning),
     ("softening", "the wall softens or cracks", Severity::Warning),
-    ("unknown", "a hazard that is not known closely", Severity::Warning),
+    ("unknown", "a hazard that is not known in detail", Severity::Warning),
 ];
 
 impl Consequence {

@@ -94,7 +94,7 @@ impl<'a> Reader<'_, 'a> {
         unknown_fields(fields, GROUP, "a reactive group", self.found);
         let module = self.names.decl(decl).module;
         if field(fields, "smarts").is_none() && field(fields, "members").is_none() {
-            self.missing(name, "`smarts` or `members`", "nothing belongs to it", "smarts: [\"...\"]");
+            self.missing(name, "`smarts` or `members`", "it contains no species", "smarts: [\"...\"]");
         }
         Group {
             decl,
@@ -113,7 +113,7 @@ impl<'a> Reader<'_, 'a> {
         let source = self.source(fields, span, "this pair");
         let Some(f) = field(fields, "consequence") else {
             let name = Name { text: "this pair".into(), span };
-            self.missing(&name, "`consequence`", "what happens is not said", "consequence: [heat, fire]");
+            self.missing(&name, "`consequence`", "it does not say what would happen", "consequence: [heat, fire]");
             return None;
         };
         let words = self.words(f);
@@ -136,13 +136,13 @@ impl<'a> Reader<'_, 'a> {
         let found = Consequence::named(&word.text);
         if found.is_none() {
             let near = near::nearest(&word.text, Consequence::names());
-            let mut d = near::unknown(word, format!("there is no consequence `{}`", word.text), "not known");
+            let mut d = near::unknown(word, format!("unknown consequence `{}`", word.text), "not known");
             d.help.extend(near::question(&near));
             if let Some(best) = near.first() {
                 d = d.guess(format!("replace with `{best}`"), word.span, best.clone());
             } else {
                 let all: Vec<String> = Consequence::names().map(|n| format!("`{n}`")).collect();
-                d = d.help(format!("it is one of {}", all.join(", ")));
+                d = d.help(format!("use one of {}", all.join(", ")));
             }
             self.found.push(d);
         }
@@ -194,7 +194,7 @@ impl<'a> Reader<'_, 'a> {
         let FieldValue::Fields(lines) = &f.value else {
             self.misfit(
                 f.span,
-                "`members` is a list of species with least contents",
+                "`members` must be a list of species with minimum contents",
                 "members: { HF: any, HCl: 0.01 mol/kg }",
             );
             return out;
@@ -221,7 +221,7 @@ impl<'a> Reader<'_, 'a> {
         match &f.value {
             FieldValue::Expr(e) => self.content(e, module),
             _ => {
-                self.misfit(f.span, "`above` is a least content", "above: 0.5 mol/kg");
+                self.misfit(f.span, "`above` must be a minimum content", "above: 0.5 mol/kg");
                 None
             }
         }
@@ -242,8 +242,8 @@ impl<'a> Reader<'_, 'a> {
             Diagnostic::error(
                 codes::TYPE_MISMATCH,
                 e.span,
-                "a least content is given in mol/kg or %w/w of the mixture",
-                "not such a quantity",
+                "a minimum content must be in mol/kg or %w/w of the mixture",
+                "another kind of quantity",
             )
             .help("write for example `0.5 mol/kg` or `8 %w/w`; for members also `any`"),
         );
@@ -278,7 +278,7 @@ impl<'a> Reader<'_, 'a> {
             Some((text, _)) => text.to_string(),
             None => {
                 let name = Name { text: what.to_string(), span };
-                self.missing(&name, "`source`", "where this is published is not said", "source: \"...\"");
+                self.missing(&name, "`source`", "it does not name its source", "source: \"...\"");
                 String::new()
             }
         }
@@ -325,13 +325,13 @@ impl<'a> Reader<'_, 'a> {
         let out: Vec<T> = items.iter().filter_map(pick).collect();
         if out.len() < items.len() || items.is_empty() {
             let key = &f.key.text;
-            self.misfit(f.span, &format!("`{key}` is a list of {what}"), &format!("{key}: {example}"));
+            self.misfit(f.span, &format!("`{key}` must be a list of {what}"), &format!("{key}: {example}"));
         }
         out
     }
 
     fn misfit(&mut self, span: Span, headline: &str, example: &str) {
-        let d = Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "something else");
+        let d = Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "not such a list");
         self.found.push(d.help(format!("write for example `{example}`")));
     }
 }

@@ -54,7 +54,7 @@ fn between(tables: &Tables<'_>, a: SpeciesId, b: SpeciesId) -> Vec<Incompatible>
         );
         let belongs = |s, party| screen.title(party).map(|title| format!("`{}` is one of the {title}", name(s)));
         let why: Vec<String> = [belongs(a, one.a), belongs(b, one.b)].into_iter().flatten().collect();
-        let why = if why.is_empty() { "published as a pair".to_owned() } else { why.join(", ") };
+        let why = if why.is_empty() { "this pair is published as incompatible".to_owned() } else { why.join(", ") };
         let help = vec![format!("{why} ({})", one.pair.source)];
         let words = one.pair.words();
         let ions = (ions(species, a), ions(species, b));

@@ -264,12 +264,12 @@ impl<'l, 'a> Judge<'l, 'a> {
         let names: Vec<String> =
             crossing.iter().map(|id| format!("`{}`", self.lab.instances[id.0 as usize].name)).collect();
         let (what, names) = (&key.member, names.join(" and "));
-        let headline = format!("`{}` carries matter between {names}, and its `{what}` stays behind", law.name);
-        let said = format!("the `{what}` of `{}` stays as it is", self.lab.instances[key.instance.0 as usize].name);
+        let headline = format!("`{}` moves matter between {names} but leaves its `{what}` behind", law.name);
+        let said = format!("the `{what}` of `{}` does not change", self.lab.instances[key.instance.0 as usize].name);
         let d = Diagnostic::warning(codes::HEAT_LEFT_BEHIND, law.span, headline, said)
-            .help("write `move(rate, from: a, to: b)`: it takes a share of every quantity along")
+            .help("write `move(rate, from: a, to: b)`: it moves a share of every quantity")
             .help(format!(
-                "for one species, move the heat of what goes as well: `a.{what}' -= h` and `b.{what}' += h` with `let h = q * S.heat_capacity * (a.temperature - reference_temperature)`"
+                "for one species, move its heat too: `a.{what}' -= h` and `b.{what}' += h` with `let h = q * S.heat_capacity * (a.temperature - reference_temperature)`"
             ));
         self.found.push(d);
     }
@@ -308,8 +308,8 @@ impl<'l, 'a> Judge<'l, 'a> {
         let headline = format!("`{}` does not conserve {}", law.name, names.join(", "));
         let said = format!("for 1 {unit} of `{}` in `{place}` it {}", def.name, each.join(" and "));
         let d = Diagnostic::error(codes::BALANCE_BREACH, law.span, headline, said)
-            .help("let one mixture gain what another loses, or write a `reaction`, whose equation is checked")
-            .help("matter that leaves for the air needs a vessel to go to");
+            .help("add to one mixture the amount that another loses, or write a `reaction`, whose equation is checked")
+            .help("matter that escapes into the air needs a vessel as its target");
         self.found.push(d);
         true
     }

@@ -124,17 +124,17 @@ impl Elaborator<'_> {
             Reason::Stopped => stopped(self.budget.item),
             Reason::Steps => too_large(
                 self.budget.item,
-                format!("this takes more than {} million steps to write out", MOST_STEPS / 1_000_000),
+                format!("expanding this takes more than {} million steps", MOST_STEPS / 1_000_000),
             ),
             Reason::Operations => too_large(
                 self.budget.item,
                 format!("this needs more than {} million operations", MOST_OPERATIONS / 1_000_000),
             ),
             Reason::Statements => {
-                too_large(self.budget.item, format!("this makes a plan of more than {MOST_STATEMENTS} steps"))
+                too_large(self.budget.item, format!("this workflow expands to more than {MOST_STATEMENTS} steps"))
             }
             Reason::Depth => {
-                too_large(self.budget.item, format!("more than {DEEPEST} expressions stand inside each other here"))
+                too_large(self.budget.item, format!("expressions are nested more than {DEEPEST} deep here"))
             }
         };
         self.report(d);
@@ -143,7 +143,6 @@ impl Elaborator<'_> {
 
 fn too_large(at: Span, headline: String) -> Diagnostic {
     Diagnostic::error(codes::BUDGET_SPENT, at, headline, "`check` gives up here").help(
-        "functions, skills and `for` are written out wherever they are used, and a law once for every combination of things that fits it: \
-         use `repeat`, a smaller set, or a narrower type",
+        "every use of a function, skill or `for` is expanded, and a law once for every combination of things that fits it: use `repeat`, a smaller set, or a narrower type",
     )
 }

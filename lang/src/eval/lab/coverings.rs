@@ -24,9 +24,9 @@ impl<'a> Elaborator<'a> {
                 _ => vec![e],
             };
             if pieces.is_empty() {
-                let headline = "`collision` is what others run into: a shape, or a list of pieces";
-                let d = Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "nothing");
-                self.report(d.help("leave it out where others run into its shape"));
+                let headline = "`collision` must be a shape or a list of shapes";
+                let d = Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "empty list");
+                self.report(d.help("remove it if `shape` is also the shape for collisions"));
             }
             out.collision = pieces.into_iter().filter_map(|piece| self.piece(id, piece, &mut scope)).collect();
         }

@@ -30,8 +30,8 @@ impl<'a> Elaborator<'a> {
         let what = words.get(index).or(words.last()).copied().unwrap_or("a length");
         let (headline, label) = match value {
             v if v > 0.0 && v <= LONGEST => return Some(v),
-            v if v > LONGEST => (format!("{what} of `{shape}` is {shown}"), format!("it may be {LONGEST} m at most")),
-            _ => (format!("{what} of `{shape}` is {shown}"), "it must be above 0".to_string()),
+            v if v > LONGEST => (format!("{what} of `{shape}` is {shown}"), format!("must be at most {LONGEST} m")),
+            _ => (format!("{what} of `{shape}` is {shown}"), "must be above 0".to_string()),
         };
         self.report(Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, label));
         None
@@ -42,8 +42,8 @@ impl<'a> Elaborator<'a> {
         let most = size.iter().copied().fold(0.0, f64::max);
         let label = match size.iter().all(|side| *side > 0.0) {
             true if most <= LONGEST => return true,
-            true => format!("it may be {LONGEST} m at most"),
-            false => "a body has a volume".to_string(),
+            true => format!("must be at most {LONGEST} m"),
+            false => "it has no volume".to_string(),
         };
         let headline = format!("`{name}` is {most:.3e} m long with this unit");
         self.report(Diagnostic::error(codes::OUT_OF_RANGE, span, headline, label));
@@ -61,8 +61,8 @@ impl<'a> Elaborator<'a> {
         let value = self.expr(e, scope);
         let Value::Num(n) = self.coerce(value, &ty, e.span, what) else { return None };
         let Some(value) = self.known(n.node) else {
-            let headline = "geometry must be known before the run";
-            self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "changes while it runs"));
+            let headline = "a size cannot change during a run";
+            self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "changes during the run"));
             return None;
         };
         let unit = self.unit_of(&n);

@@ -172,7 +172,7 @@ impl<'a> Elaborator<'a> {
                 self.report(Diagnostic::error(
                     codes::CIRCULAR,
                     from.span,
-                    format!("where `{}` is depends on itself", name.text),
+                    format!("the position of `{}` depends on itself", name.text),
                     "leads back to it",
                 ));
                 continue;
@@ -269,7 +269,7 @@ impl<'a> Elaborator<'a> {
 
     pub(super) fn shape(&mut self, id: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
         if let Some(arg) = call(e).and_then(|(_, args)| args.iter().find(|arg| is_place(arg))) {
-            let headline = "a place is given in the pieces of `collision` only";
+            let headline = "only pieces of `collision` take a place";
             let d = Diagnostic::error(codes::WRONG_ARGUMENTS, arg.value.span, headline, "not here");
             self.report(d.help("a line `solid box(...) at (x, y, z) mm` adds a piece somewhere else"));
             return None;
@@ -331,8 +331,8 @@ impl<'a> Elaborator<'a> {
                 name,
                 codes::WRONG_ARGUMENTS,
                 e.span,
-                format!("`{name}` is given {given}"),
-                "not these",
+                format!("`{name}` takes {given}"),
+                "other arguments",
             ));
         }
         shape
@@ -341,7 +341,7 @@ impl<'a> Elaborator<'a> {
     /// The mesh in a file, of which one unit is so long, m.
     pub(super) fn mesh(&mut self, id: InstanceId, span: Span, file: &'a Expr, unit: Option<f64>) -> Option<Shape> {
         let ExprKind::Text(name) = &*file.kind else {
-            let d = Diagnostic::error(codes::TYPE_MISMATCH, file.span, "a mesh is named by its file", "not a text");
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, file.span, "`mesh` needs the name of a file", "not a text");
             self.report(d.help("`mesh(\"bottle.stl\", 1 mm)`"));
             return None;
         };
@@ -350,7 +350,7 @@ impl<'a> Elaborator<'a> {
             _ => None,
         });
         let Some(read) = read else {
-            let headline = "a mesh is given where its asset is declared";
+            let headline = "a mesh must be given in the declaration of its asset";
             self.report(Diagnostic::error(codes::UNSUPPORTED, file.span, headline, "not here"));
             return None;
         };
@@ -364,10 +364,10 @@ impl<'a> Elaborator<'a> {
                     name,
                     codes::WRONG_ARGUMENTS,
                     span,
-                    format!("`{name}` does not say its unit"),
-                    "how long is one unit of it",
+                    format!("the file `{name}` does not give its unit of length"),
+                    "the length of one unit is missing",
                 );
-                self.report(d.help(format!("`mesh(\"{name}\", 1 mm)` where it is drawn in millimetres")));
+                self.report(d.help(format!("write `mesh(\"{name}\", 1 mm)` if it is drawn in millimetres")));
                 return None;
             }
         };
@@ -383,7 +383,7 @@ impl<'a> Elaborator<'a> {
                 codes::OUT_OF_RANGE,
                 span,
                 "its wall and floor leave no room inside",
-                "nothing fits in",
+                "no room inside",
             ));
             return None;
         }
@@ -398,16 +398,16 @@ impl<'a> Elaborator<'a> {
         let mm = |v: f64| show_number((v * 1e6).round() / 1e3);
         let label = match radius_at(outside, z) {
             Some(around) => format!(
-                "at a height of {} mm it is {} mm wide from the middle, the outside {} mm",
+                "at a height of {} mm its radius is {} mm, but that of the outside is {} mm",
                 mm(z),
                 mm(r),
                 mm(around)
             ),
-            None => format!("it has a point at a height of {} mm, where the outside has none", mm(z)),
+            None => format!("it has a point at a height of {} mm, above or below the outside", mm(z)),
         };
-        let headline = "the inside of this shape sticks out of its outside";
+        let headline = "the inside of this shape is wider or taller than its outside";
         let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, label);
-        self.report(d.help("points are a radius, half the diameter, and a height; the outside comes first"));
+        self.report(d.help("write each point as radius and height, the outside first"));
     }
 
     /// Points of radius and height, m, no radius below 0, from the bottom up.
@@ -426,15 +426,15 @@ impl<'a> Elaborator<'a> {
             let Value::Tuple(items) = self.expr(point, scope) else { return None };
             let [r, z, _] = self.position(&items, point)?;
             if r.abs().max(z.abs()) > LONGEST {
-                let headline = format!("a point of an outline is more than {LONGEST} m away");
-                self.report(Diagnostic::error(codes::OUT_OF_RANGE, point.span, headline, "no shape is so large"));
+                let headline = format!("this point of an outline is more than {LONGEST} m away");
+                self.report(Diagnostic::error(codes::OUT_OF_RANGE, point.span, headline, "too far away"));
                 return None;
             }
             if r < 0.0 || items.len() != 2 || out.last().is_some_and(|last| z < last[1]) {
                 self.report(Diagnostic::error(
                     codes::OUT_OF_RANGE,
                     point.span,
-                    "a point of an outline is a radius and a height, from the bottom up",
+                    "write each point of an outline as radius and height, from the bottom up",
                     "not such a point",
                 ));
                 return None;

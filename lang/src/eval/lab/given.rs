@@ -64,8 +64,8 @@ fn names_in<'e>(e: &'e Expr, out: &mut Vec<&'e str>) {
 fn reason(m: &MemberRef<'_>) -> Option<&'static str> {
     match &m.member.kind {
         MemberKind::Value { role: Role::Derived, .. } => Some("follows from other members"),
-        MemberKind::Value { role: Role::Reading, .. } => Some("is what the device reports"),
-        MemberKind::Value { role: Role::Flow, .. } => Some("is summed up by laws"),
+        MemberKind::Value { role: Role::Reading, .. } => Some("is reported by the device"),
+        MemberKind::Value { role: Role::Flow, .. } => Some("is a sum over laws"),
         MemberKind::Frame { .. } => Some("is a frame"),
         MemberKind::Process(_) => Some("is a process"),
         MemberKind::Event(_) => Some("is an event"),
@@ -86,7 +86,7 @@ impl<'a> Elaborator<'a> {
                 let matter = kinds.iter().find_map(|k| tables.kinds.get(k)?.matter);
                 matter.is_some_and(|of| std::ptr::eq(of.member, m.member))
             };
-            let reason = |m: &MemberRef<'a>| if is_held(m) { Some("is what `holding` says") } else { reason(m) };
+            let reason = |m: &MemberRef<'a>| if is_held(m) { Some("is given by `holding`") } else { reason(m) };
             // A capability may also mean its own member of that name: one that can be given is enough.
             let Some(m) = found.first().filter(|_| found.iter().all(|m| reason(m).is_some())) else { continue };
             let derived = matches!(&m.member.kind, MemberKind::Value { role: Role::Derived, .. });
@@ -96,7 +96,7 @@ impl<'a> Elaborator<'a> {
             let why = reason(m).unwrap_or_default();
             let owner = tables.kind_name(m.owner);
             let headline = format!("`{key}` of `{}` {why} and cannot be given", tables.kind_name(kind));
-            let d = Diagnostic::error(codes::DERIVED_MEMBER, f.span, headline, "would never change");
+            let d = Diagnostic::error(codes::DERIVED_MEMBER, f.span, headline, "cannot be given here");
             let d = d.because(m.member.span, format!("`{owner}` declares it here"));
             let help = self.instead(kind, m);
             self.report(d.help(help));
@@ -139,15 +139,15 @@ impl<'a> Elaborator<'a> {
                 self.sources(kind, value.as_ref(), DEEPEST, &mut found);
                 let names: Vec<String> = found.iter().map(|n| format!("`{n}`")).collect();
                 match names.as_slice() {
-                    [] => "leave it out".to_string(),
-                    names => format!("it follows from {}: give that", names.join(", ")),
+                    [] => "remove it".to_string(),
+                    names => format!("it follows from {}: give that instead", names.join(", ")),
                 }
             }
             MemberKind::Value { role: Role::Extensive, .. } => "write `holding 10 g of water`".to_string(),
             MemberKind::Frame { name, .. } => {
-                format!("the asset says where it is: `frame {} at (x, y, z) mm`", name.text)
+                format!("its asset places it: `frame {} at (x, y, z) mm`", name.text)
             }
-            _ => "leave it out".to_string(),
+            _ => "remove it".to_string(),
         }
     }
 
@@ -199,8 +199,8 @@ impl<'a> Elaborator<'a> {
         if self.moves(&before) != Some(true) || self.moves(&now) != Some(false) {
             return;
         }
-        let headline = format!("`{}` changes with the state of the thing and cannot be given as a constant", name.text);
-        let d = Diagnostic::error(codes::DERIVED_MEMBER, line.span, headline, "would never change");
+        let headline = format!("`{}` changes during a run and cannot be given as a constant", name.text);
+        let d = Diagnostic::error(codes::DERIVED_MEMBER, line.span, headline, "cannot be given here");
         let d = d.because(m.member.span, format!("`{}` declares it here", self.tables.kind_name(m.owner)));
         let kind = self.instances[this.0 as usize].kinds[0];
         let help = self.instead(kind, &m);
@@ -222,9 +222,11 @@ impl<'a> Elaborator<'a> {
         let members = self.all_members(id);
         let Some(m) = members.iter().find(|m| takes_start(m)) else {
             let kind = self.kind_names(id);
-            let headline = format!("`{kind}` does not say what `at` after `holding` means");
-            let d = Diagnostic::error(codes::TYPE_MISMATCH, at.span, headline, "has no meaning here");
-            self.report(d.help("a mixture declares it: `param start: Temperature = ambient { given_by: at }`"));
+            let headline = format!("`{kind}` takes no `at` after `holding`");
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, at.span, headline, "not allowed here");
+            self.report(
+                d.help("its capability must declare it: `param start: Temperature = ambient { given_by: at }`"),
+            );
             return;
         };
         let MemberKind::Value { name, .. } = &m.member.kind else { return };
@@ -241,7 +243,7 @@ impl<'a> Elaborator<'a> {
         if let Some(rival) = rival {
             let headline = format!("`at` and `{}` both give the initial temperature of the contents", rival.key.text);
             let d = Diagnostic::error(codes::DUPLICATE_NAME, at.span, headline, "given again here");
-            self.report(d.because(rival.span, "first given here").help("leave one of them out"));
+            self.report(d.because(rival.span, "first given here").help("remove one of them"));
             return;
         }
         self.instances[id.0 as usize].start = Some((at, module));
@@ -304,9 +306,9 @@ impl<'a> Elaborator<'a> {
         let Some(with) = word(options, ONLY_WITH) else { return };
         let instance = &self.instances[id.0 as usize];
         let Some(given) = instance.setting(with).filter(|_| instance.contents.is_empty()) else { return };
-        let headline = format!("`{with}` is given for contents, and `{}` holds nothing at the start", instance.name);
-        let d = Diagnostic::error(codes::MISPLACED, given.field.span, headline, "there are no contents to give it for");
-        self.report(d.help("give it with what the vessel is `holding`, or leave it out"));
+        let headline = format!("`{with}` describes contents, but `{}` is empty at the start", instance.name);
+        let d = Diagnostic::error(codes::MISPLACED, given.field.span, headline, "there are no contents");
+        self.report(d.help("add contents with `holding`, or remove it"));
     }
 }
 

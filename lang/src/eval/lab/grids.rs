@@ -121,8 +121,13 @@ impl<'a> Elaborator<'a> {
         }
         let Some(layout) = self.layout(id, module, line) else { return };
         if self.instances.len() + places.len() > MOST_PARTS {
-            let headline = format!("a lab has {MOST_PARTS} things and parts at most");
-            self.report(Diagnostic::error(codes::OUT_OF_RANGE, line.name.span, headline, "too many with these"));
+            let headline = format!("a lab has at most {MOST_PARTS} things and parts");
+            self.report(Diagnostic::error(
+                codes::OUT_OF_RANGE,
+                line.name.span,
+                headline,
+                "too many together with these",
+            ));
             return;
         }
         let given = self.given_to_all(id, &line.name, kind);
@@ -174,7 +179,7 @@ impl<'a> Elaborator<'a> {
                     Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         setting.field.span,
-                        format!("`{}` is a grid and has no value of its own", grid.text),
+                        format!("`{}` is a grid: it takes fields, not one value", grid.text),
                         "not fields",
                     )
                     .help(format!("give fields for all of its children: `{}: {{ ... }}`", grid.text)),
@@ -205,7 +210,7 @@ impl<'a> Elaborator<'a> {
             let kind = self.kind_names(id);
             self.report(
                 Diagnostic::error(codes::MISSING_FIELD, span, format!("`{kind}` has no `{}`", name.text), "not given")
-                    .because(name.span, "asked for here")
+                    .because(name.span, "required here")
                     .help(format!("give them in the asset: `{}[A1 .. H12] = Well {{ ... }}`", name.text)),
             );
             return;
@@ -216,8 +221,8 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(
                 codes::TYPE_MISMATCH,
                 self.instances[child.0 as usize].span,
-                format!("`{}` expects {wanted}, but `{found}` is none", name.text),
-                format!("no {wanted}"),
+                format!("`{}` expects {wanted}, but `{found}` is not one", name.text),
+                format!("not {wanted}"),
             ));
         }
     }
@@ -248,7 +253,7 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(
                 codes::OUT_OF_RANGE,
                 line.from.span.to(last.span),
-                format!("a grid has {MOST} places at most"),
+                format!("a grid has at most {MOST} places"),
                 "too many",
             ));
             return None;
@@ -282,8 +287,8 @@ impl<'a> Elaborator<'a> {
                 self.report(Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     span,
-                    format!("`{}` and `{}` are not places of one grid", at.text, end.text),
-                    "one has a row, the other has none",
+                    format!("`{}` and `{}` cannot be corners of one grid", at.text, end.text),
+                    "only one of them has a row",
                 ));
                 return None;
             }
@@ -296,7 +301,7 @@ impl<'a> Elaborator<'a> {
                     format!("the range `{} .. {}` is empty", at.text, end.text),
                     "its last place comes before its first",
                 )
-                .help("a range goes from the corner at the back left to the one at the front right"),
+                .help("write a range from the back left corner to the front right corner"),
             );
             return None;
         }
@@ -335,14 +340,14 @@ impl<'a> Elaborator<'a> {
             let Value::Num(n) = self.coerce(v, &Type::ratio(), e.span, "by") else { return None };
             let count = self.graph.constant(n.node).filter(|v| *v >= 1.0 && v.fract() == 0.0);
             let Some(count) = count else {
-                let headline = "how many stand in a row is a whole number";
+                let headline = "the number of places in a row must be a whole number";
                 self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "not a whole number"));
                 return None;
             };
             layout.row = Some(count as u32);
             if Place::parse(&line.from.text).is_some_and(|p| p.row.is_some()) {
-                let headline = "the letters of these places say which row they are in";
-                self.report(Diagnostic::error(codes::MISPLACED, e.span, headline, "only for places that are numbered"));
+                let headline = "these places have letters for their rows";
+                self.report(Diagnostic::error(codes::MISPLACED, e.span, headline, "only for numbered places"));
             }
         }
         Some(layout)
@@ -402,8 +407,8 @@ impl<'a> Elaborator<'a> {
         let mut d = Diagnostic::error(
             codes::UNKNOWN_MEMBER,
             name.span,
-            format!("`{thing}` has no place `{}`: it has {extent}", name.text),
-            "not a place of it",
+            format!("`{thing}` has no `{}`: it has {extent}", name.text),
+            "no such place",
         );
         if !self.prototype {
             d = d.because(declared, format!("`{}` is declared here", instance.name));
@@ -413,7 +418,7 @@ impl<'a> Elaborator<'a> {
         {
             d = d.fix(format!("write `{upper}`"), name.span, upper);
         } else if lettered && Place::parse(&name.text).is_none_or(|p| p.row.is_none()) {
-            d = d.help(format!("a place is written as it is printed, such as `A1`; the n-th is `{thing}.well(n)`"));
+            d = d.help(format!("write a place as printed, such as `A1`; the n-th place is `{thing}.well(n)`"));
         }
         self.report(d);
     }
@@ -495,7 +500,7 @@ impl<'a> Elaborator<'a> {
             codes::UNKNOWN_MEMBER,
             at,
             format!("`{thing}` has {count} {name}{}", if count == 1 { "" } else { "s" }),
-            "not the number of one of them (the first is 1)",
+            "out of range (the first is 1)",
         ));
         Value::Error
     }

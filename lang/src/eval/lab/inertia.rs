@@ -42,7 +42,12 @@ impl<'a> Elaborator<'a> {
     pub fn inertial(&mut self, id: InstanceId, geometry: &Geometry) -> Option<Inertial> {
         let given = self.given_moments(id);
         if let (Some((_, span)), true) = (given, self.members_of(id, MASS.0).is_empty()) {
-            let d = Diagnostic::error(codes::MISSING_FIELD, span, "it has an inertia, but no mass", "of what mass");
+            let d = Diagnostic::error(
+                codes::MISSING_FIELD,
+                span,
+                "this asset has an inertia but no mass",
+                "no mass is given",
+            );
             self.report(d.help("make it a `Body`, and give its `mass`"));
         }
         let mass = self.plain(id, MASS)?;
@@ -52,9 +57,9 @@ impl<'a> Elaborator<'a> {
         let centre = geometry.frames.iter().find(|f| f.name == frame::CENTRE && !f.stand && f.link.is_none());
         let middle = centre.map(|f| f.pose.position).or(derived.map(|d| d.placement.position));
         if let (Some((_, span)), None) = (given, middle) {
-            let headline = "it is not known where its centre of mass is";
-            let d = Diagnostic::error(codes::MISSING_FIELD, span, headline, "about which point");
-            self.report(d.help("give its `shape`, or say `frame centre at (0, 0, 20) mm`"));
+            let headline = "the centre of mass of this asset is unknown";
+            let d = Diagnostic::error(codes::MISSING_FIELD, span, headline, "about an unknown point");
+            self.report(d.help("give its `shape`, or write `frame centre at (0, 0, 20) mm`"));
         }
         let inertia = match (given, derived) {
             (Some((moments, span)), _) => {
@@ -135,9 +140,9 @@ impl<'a> Elaborator<'a> {
         let FieldValue::Expr(e) = setting.value() else { return None };
         let moments = self.moments(e, &mut setting.scope())?;
         if let Some(why) = impossible(moments) {
-            let d = Diagnostic::error(codes::OUT_OF_RANGE, e.span, "no body has such an inertia", why);
+            let d = Diagnostic::error(codes::OUT_OF_RANGE, e.span, "this inertia is impossible", why);
             self.report(d.help(
-                "about the centre of mass, along the axes of the asset; leave it out to have it from mass and shape",
+                "give it about the centre of mass, along the axes of the asset, or remove it: then it follows from mass and shape",
             ));
             return None;
         }
@@ -155,7 +160,7 @@ impl<'a> Elaborator<'a> {
             }
         };
         if ![3, 6].contains(&items.len()) {
-            let headline = format!("expected {given}, not {} of them", items.len());
+            let headline = format!("expected {given}, found {} values", items.len());
             self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "not an inertia"));
             return None;
         }
@@ -181,10 +186,10 @@ impl<'a> Elaborator<'a> {
         // Half the sum of the moments is the mass times the mean of the squared distance.
         let sum = (moments[0] + moments[3] + moments[5]) / 2.0;
         if sum > NOMINAL * most {
-            let headline = "its mass within its shape has no such inertia";
-            let label = format!("{:.2} times the most it can be", sum / most);
+            let headline = "this inertia is impossible for its mass and shape";
+            let label = format!("{:.2} times the possible maximum", sum / most);
             let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, label);
-            self.report(d.help("compare units: 1 g*mm^2 is 1e-9 kg*m^2"));
+            self.report(d.help("check the units: 1 g*mm^2 is 1e-9 kg*m^2"));
         }
     }
 

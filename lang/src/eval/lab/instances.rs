@@ -242,8 +242,8 @@ impl<'a> Elaborator<'a> {
         self.report(matterix_ir::Diagnostic::error(
             matterix_ir::codes::TYPE_MISMATCH,
             span,
-            format!("`{name}` expects {wanted}, but `{found}` is none"),
-            format!("no {wanted}"),
+            format!("`{name}` expects {wanted}, but `{found}` is not one"),
+            format!("not {wanted}"),
         ));
     }
 

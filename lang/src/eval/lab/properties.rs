@@ -132,8 +132,8 @@ impl<'a> Elaborator<'a> {
                     _ => self.report(Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         f.span,
-                        format!("`{}.{}` is one value", def.name, f.key.text),
-                        "not a value",
+                        format!("`{}.{}` must be one value", def.name, f.key.text),
+                        "not one value",
                     )),
                 }
             }
@@ -151,9 +151,9 @@ impl<'a> Elaborator<'a> {
     /// A pure substance takes up heat as it warms.
     fn not_above_zero(&mut self, def: &SpeciesDef<'a>) {
         let Some(f) = field(def.fields, "heat_capacity") else { return };
-        let headline = format!("the heat capacity of `{}` is not above zero", def.name);
+        let headline = format!("the heat capacity of `{}` must be above zero", def.name);
         let d = Diagnostic::error(codes::OUT_OF_RANGE, f.span, headline, "must be above 0 J/(mol*K)");
-        self.report(d.help("only that of ions and gases dissolved in water may be negative"));
+        self.report(d.help("only ions and gases dissolved in water may have a negative heat capacity"));
     }
 
     /// A stated molar mass must agree with the formula.
@@ -165,7 +165,7 @@ impl<'a> Elaborator<'a> {
         let Some(stated) = self.graph.constant(n.node) else { return };
         let unit = self.unit_of(&Num { literal: true, ..n });
         let headline = match def.formula {
-            None => format!("`{}` is counted by mass and has no molar mass", def.name),
+            None => format!("`{}` is declared `by: mass` and has no molar mass", def.name),
             Some(_) if (stated / def.molar_mass - 1.0).abs() <= SAME => return,
             Some(_) => format!("the molar mass of `{}` is {}", def.name, unit.show(def.molar_mass)),
         };
@@ -182,8 +182,8 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let (Some(f), Some(g)) = (field(def.fields, key), field(def.fields, other)) else { return };
-        let headline = format!("`{key}` and `{other}` of `{}` do not agree", def.name);
-        let d = Diagnostic::error(codes::OUT_OF_RANGE, g.span, headline, "says something else");
-        self.report(d.because(f.span, "than this").help("leave one of them out: it follows from the other"));
+        let headline = format!("`{key}` and `{other}` of `{}` contradict each other", def.name);
+        let d = Diagnostic::error(codes::OUT_OF_RANGE, g.span, headline, "this value");
+        self.report(d.because(f.span, "contradicts this one").help("remove one of them: it follows from the other"));
     }
 }

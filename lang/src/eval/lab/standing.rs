@@ -17,7 +17,7 @@ const PLAY: f64 = 5e-3;
 const NOMINAL: f64 = 1e-3;
 
 impl Elaborator<'_> {
-    /// Reports things that stand on each other, and those that a lab puts `at` a place where nothing bears them.
+    /// Reports things that stand on each other, and those that a lab puts `at` a place where nothing supports them.
     pub fn judge_standing(&mut self) {
         let ids: Vec<InstanceId> = (0..self.instances.len() as u32).map(InstanceId).collect();
         let rings: Vec<Vec<InstanceId>> = ids.iter().filter_map(|id| self.ring_of(*id)).collect();
@@ -63,10 +63,12 @@ impl Elaborator<'_> {
         let d = Diagnostic::error(
             codes::CIRCULAR,
             *span,
-            format!("`{name}` stands on {} and that on `{name}`", below.join(", that on ")),
-            "nothing bears them",
+            format!("`{name}` is placed on {}, and that again on `{name}`", below.join(", that on ")),
+            "nothing supports them",
         );
-        let last = others.iter().fold(d, |d, (other, at)| d.because(*at, format!("`{other}` stands on what it bears")));
+        let last = others
+            .iter()
+            .fold(d, |d, (other, at)| d.because(*at, format!("`{other}` would stand on a thing that it carries")));
         self.report(last);
     }
 
@@ -86,12 +88,12 @@ impl Elaborator<'_> {
         if shape != room || !solids.is_empty() {
             return false;
         }
-        let headline = format!("`{name}` does not stand in the place that `{slot}` is");
-        let label = format!("it is {:.0} mm from there", x.hypot(y) * 1e3);
+        let headline = format!("`{name}` is {:.0} mm away from `{slot}`, on which it is placed", x.hypot(y) * 1e3);
+        let label = "this moves it off its place";
         let d = Diagnostic::error(codes::OFF_PLACE, at, headline, label);
         self.report(match whole {
-            Some(whole) => d.help(format!("leave out `at`: `{slot}` says where on `{whole}` it stands")),
-            None => d.help("leave out `at`"),
+            Some(whole) => d.help(format!("remove `at`: `{slot}` already gives the position on `{whole}`")),
+            None => d.help("remove `at`"),
         });
         true
     }
@@ -123,7 +125,7 @@ impl Elaborator<'_> {
             return;
         }
         let headline = format!("`{name}` stands beyond the edge of `{below}`");
-        let label = format!("its centre of mass is {:.0} mm beyond what bears it", -margin * 1e3);
+        let label = format!("its centre of mass is {:.0} mm past the edge of its support", -margin * 1e3);
         let d = Diagnostic::error(codes::UNSTABLE, at, headline, label);
         let ahead = self.place_on(on).and_then(|top| self.in_lab(on, top));
         let seen = ahead
@@ -131,7 +133,7 @@ impl Elaborator<'_> {
             .map(|back| bearing.iter().map(move |(shape, at)| (shape, back.then(*at))).collect::<Vec<_>>());
         let all = seen.and_then(|pieces| reach(0.0, pieces.into_iter()));
         self.report(match all.map(|all| all.map(|[x, y]| format!("({:.0}, {:.0}) mm", x * 1e3, y * 1e3))) {
-            Some([low, high]) => d.help(format!("`{below}` reaches from {low} to {high}")),
+            Some([low, high]) => d.help(format!("`{below}` extends from {low} to {high}")),
             None => d,
         });
     }

@@ -157,7 +157,7 @@ impl<'a> Elaborator<'a> {
             _ => return true,
         };
         if known.is_none() {
-            let headline = "whether a member is hidden cannot change in a run";
+            let headline = "`hidden` cannot depend on the run";
             self.report(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "changes in a run"));
         }
         known.is_none_or(|truth| truth != 0.0)
@@ -237,7 +237,7 @@ impl<'a> Elaborator<'a> {
                         codes::MISSING_FIELD,
                         span,
                         format!("`{inst_name}` needs an initial `{name}`"),
-                        "not given, and there is no default",
+                        "not given, and it has no default",
                     )
                     .because(m.member.span, "declared here"),
                 );

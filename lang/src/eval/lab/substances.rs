@@ -22,9 +22,10 @@ impl Elaborator<'_> {
         let id = names.lookup(module, &name.text);
         if let Some(s) = id.and_then(|id| self.tables.species.of_decl(id)) {
             if self.tables.species.get(s).is_electron {
-                let headline = format!("nothing holds `{}`: electrons are formal", name.text);
-                let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, name.span, headline, "stands in half-cells alone");
-                self.report(d.help("give what takes up electrons, or gives them: Fe3+, or Fe2+"));
+                let headline = format!("a vessel cannot hold `{}`: electrons are only formal", name.text);
+                let d =
+                    Diagnostic::error(codes::EQUILIBRIUM_FORM, name.span, headline, "only half-cells have electrons");
+                self.report(d.help("name the oxidised or the reduced species: Fe3+ or Fe2+"));
                 return None;
             }
             if self.is_refused_as_gas(s, name) {
@@ -47,11 +48,11 @@ impl Elaborator<'_> {
     pub fn is_refused_as_gas(&mut self, s: SpeciesId, name: &Name) -> bool {
         let is_gas = self.tables.species.get(s).is_gas && !self.prototype;
         if is_gas {
-            let headline = format!("no vessel holds `{}`: there is no gas phase", name.text);
-            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, name.span, headline, "stands in equilibria alone");
+            let headline = format!("a vessel cannot hold `{}`: the model has no gas phase", name.text);
+            let d = Diagnostic::error(codes::EQUILIBRIUM_FORM, name.span, headline, "only equilibria have gases");
             let plain = name.text.trim_end_matches("(g)");
-            let help = format!("name what is dissolved of it: `{plain}`");
-            self.report(d.help(help).help("a `GasExchange` of std::gases says what gas is above a vessel"));
+            let help = format!("name the dissolved gas: `{plain}`");
+            self.report(d.help(help).help("for the gas above a vessel use a `GasExchange` of std::gases"));
         }
         is_gas
     }

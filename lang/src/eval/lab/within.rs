@@ -45,7 +45,7 @@ impl Elaborator<'_> {
             .chain(self.included.iter().filter_map(|n| inner(n)))
             .collect();
         let near = near::nearest(&name.text, known);
-        let headline = format!("`{lab}` holds no `{}`", name.text);
+        let headline = format!("`{lab}` has no `{}`", name.text);
         let mut d = Diagnostic::error(codes::UNKNOWN_MEMBER, name.span, headline, "not in this lab");
         d = near::proposed(d, &near, name.span);
         self.report(d);

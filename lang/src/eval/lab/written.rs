@@ -61,7 +61,7 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(
                 codes::TYPE_MISMATCH,
                 at.span,
-                format!("a position has two or three coordinates, not {}", items.len()),
+                format!("a position needs two or three coordinates, not {}", items.len()),
                 "not a position",
             ));
             return None;

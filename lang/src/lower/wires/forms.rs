@@ -68,23 +68,23 @@ impl Planner<'_, '_> {
         let form = match Form::parse(text, modbus) {
             Ok(form) => form,
             Err(why) => {
-                self.lab.report(Diagnostic::error(codes::DRIVER_LINE, at, why, "not understood"));
+                self.lab.report(Diagnostic::error(codes::DRIVER_LINE, at, why, "invalid format"));
                 return None;
             }
         };
         let wrong = match &self.speech {
             Speech::Text(_) if form.is_raw() => Some((
-                "bytes of a number are no printable characters",
-                "write `hex` behind it, or a framing that `carries: bytes`",
+                "a text framing cannot carry the bytes of a number",
+                "add `hex`, or use a framing with `carries: bytes`",
             )),
             Speech::Free | Speech::Calls if !form.is_plain() => Some((
-                "a server is told a number as people write it",
-                "as in `:.1`, or `:.0 * 10` where it counts tenths",
+                "a server takes numbers in decimal form",
+                "write it as in `:.1`, or `:.0 * 10` if it counts tenths",
             )),
             _ => None,
         };
         if let Some((headline, help)) = wrong {
-            self.wrong(at, headline, "another form", help);
+            self.wrong(at, headline, "another format", help);
             return None;
         }
         Some(if modbus { form.in_hex() } else { form })
@@ -96,8 +96,8 @@ impl Planner<'_, '_> {
         match form.put(unit, known) {
             Ok(_) => Some(()),
             Err(why) => {
-                let headline = format!("{} cannot be sent in this form: {why}", unit.show(known));
-                self.wrong(at, &headline, "does not fit", "a device would be told another number, or nothing");
+                let headline = format!("{} cannot be sent in this format: {why}", unit.show(known));
+                self.wrong(at, &headline, "does not fit", "the device would receive another number, or none");
                 None
             }
         }
@@ -116,15 +116,15 @@ impl Planner<'_, '_> {
                 };
                 (
                     text.chars().find(bad),
-                    "a text has printable characters without those that end a frame; `carries: bytes` has any",
+                    "a text may have printable characters other than those that end a frame; `carries: bytes` may have any",
                 )
             }
         };
         match bad {
             None => Some(()),
             Some(c) => {
-                let headline = format!("`{}` cannot stand in a message of this framing", c.escape_default());
-                self.wrong(at, &headline, "cannot be told from the rest", help);
+                let headline = format!("a message of this framing cannot contain `{}`", c.escape_default());
+                self.wrong(at, &headline, "not allowed here", help);
                 None
             }
         }
@@ -142,8 +142,8 @@ impl Planner<'_, '_> {
                 }
         });
         if touches && !matches!(self.speech, Speech::Free | Speech::Calls) {
-            let help = "put something between them, or give the number a width, as in `:05.1`";
-            self.wrong(at, "a number cannot be told from what follows it", "they touch", help);
+            let help = "put a separator between them, or give the number a width, as in `:05.1`";
+            self.wrong(at, "the end of this number is ambiguous", "the next part follows directly", help);
             return None;
         }
         Some(())
@@ -158,9 +158,11 @@ impl Planner<'_, '_> {
             _ => false,
         });
         if touches {
-            let headline = "what a reply says between two values must be known";
-            let d = Diagnostic::error(codes::DRIVER_LINE, at, headline, "two values touch");
-            self.lab.report(d.help("or give the first a width, as in `{degC :05.1}` or `{_ :u16}`"));
+            let headline = "a reply needs a text between two values";
+            let d = Diagnostic::error(codes::DRIVER_LINE, at, headline, "two values follow directly");
+            self.lab.report(
+                d.help("put a separator between them, or give the first a width, as in `{degC :05.1}` or `{_ :u16}`"),
+            );
             return None;
         }
         Some(())
@@ -175,12 +177,13 @@ impl Planner<'_, '_> {
             let sent = if sent == "_" && i + 1 == parts.len() && i > 0 { None } else { Some(sent) };
             let again = out.iter().any(|c| sent.is_some() && c.sent.as_deref() == sent);
             if sent == Some("") || sent == Some("_") || word.is_empty() || again {
-                let headline = if again { "the same stands for two words" } else { "this gives no words" };
+                let headline =
+                    if again { "the same text is given for two words" } else { "this list of words is incomplete" };
                 self.wrong(
                     at,
                     headline,
-                    "not understood",
-                    "as in `{S = stopped | I = running}`; at the end `_ = other` is all else",
+                    "invalid format",
+                    "write it as in `{S = stopped | I = running}`; `_ = other` at the end takes all other texts",
                 );
                 return None;
             }
@@ -201,7 +204,12 @@ impl Planner<'_, '_> {
         let strange = choices.iter().find(|c| !words.contains(&c.word));
         if all.is_none() || strange.is_some() {
             let list = words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", ");
-            self.wrong(form.span, "each word has what stands for it", "not these", &format!("the words are {list}"));
+            self.wrong(
+                form.span,
+                "every word needs a text for it",
+                "other words",
+                &format!("give a text for each of {list}"),
+            );
             return None;
         }
         all

@@ -36,12 +36,7 @@ impl<'a> Planner<'a, '_> {
         let given = |key: &str| fields.iter().find(|f| f.key.text == key);
         let Some(carries) = given("carries") else {
             let help = "`carries: text`, `carries: bytes` or `carries: modbus`";
-            return self.no_framing(
-                name.span,
-                "what the frames carry is not said",
-                "nothing is taken for granted",
-                help,
-            );
+            return self.no_framing(name.span, "a framing needs `carries`", "it has no default", help);
         };
         let carries = self.carries(carries)?;
         let (request, reply) = match (given("frame"), given("request"), given("reply")) {
@@ -52,7 +47,7 @@ impl<'a> Planner<'a, '_> {
             (None, Some(request), Some(reply)) => (self.layout(request)?, self.layout(reply)?),
             _ => {
                 let help = "write `frame: \"...{data}...\"`, or both `request: \"...\"` and `reply: \"...\"`";
-                return self.no_framing(name.span, "what a frame looks like is not said once", "no layout", help);
+                return self.no_framing(name.span, "give the layout of a frame once", "missing, or given twice", help);
             }
         };
         let length = match given("length") {
@@ -79,10 +74,10 @@ impl<'a> Planner<'a, '_> {
             let key = field.key.text.as_str();
             let again = fields[..i].iter().any(|f| f.key.text == key);
             if again || !FIELDS.contains(&key) {
-                let what = if again { "is given twice" } else { "is nothing that a framing has" };
+                let what = if again { "is given twice" } else { "is not a field of a framing" };
                 let d = Diagnostic::error(codes::FRAMING, field.key.span, format!("`{key}` {what}"), "not expected");
                 let near = if again { Vec::new() } else { near::nearest(key, FIELDS) };
-                self.lab.report(near::proposed(d, &near, field.key.span).help(format!("it has {}", listed(FIELDS))));
+                self.lab.report(near::proposed(d, &near, field.key.span).help(format!("use {}", listed(FIELDS))));
                 return None;
             }
         }
@@ -96,9 +91,9 @@ impl<'a> Planner<'a, '_> {
             Some("modbus") => Some(Carries::Modbus),
             _ => self.no_framing(
                 field.span,
-                "frames carry `text`, `bytes` or `modbus`",
-                "not one of these",
-                "`text` is printable; `bytes` are any; `modbus` are its requests and answers",
+                "`carries` must be `text`, `bytes` or `modbus`",
+                "another value",
+                "`text` for printable characters, `bytes` for any bytes, `modbus` for requests and replies of Modbus",
             ),
         }
     }
@@ -113,7 +108,12 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         };
         let Some(text) = text else {
-            return self.no_framing(field.span, "a layout is a text", "not one", "as in `\"\\x02{data}\\x03\"`");
+            return self.no_framing(
+                field.span,
+                "a layout must be a text",
+                "not a text",
+                "write it as in `\"\\x02{data}\\x03\"`",
+            );
         };
         let mut parts: Vec<Part> = Vec::new();
         let mut rest = text;
@@ -125,13 +125,13 @@ impl<'a> Planner<'a, '_> {
                         field.span,
                         "a brace is not closed",
                         "`{` without `}`",
-                        "itself it is `{{`",
+                        "write `{{` for the brace itself",
                     );
                 };
                 let part = self.part(inner, field.span)?;
                 if parts.iter().any(|p| p.mark() == part.mark()) {
-                    let headline = format!("`{{{inner}}}` stands twice in a layout");
-                    return self.no_framing(field.span, &headline, "which one is it?", "name each part once");
+                    let headline = format!("a layout contains `{{{inner}}}` twice");
+                    return self.no_framing(field.span, &headline, "given twice", "use each part once");
                 }
                 parts.push(part);
                 rest = after;
@@ -140,7 +140,7 @@ impl<'a> Planner<'a, '_> {
             let Some(byte) = u8::try_from(u32::from(c)).ok().filter(|_| doubled || c != '}') else {
                 return self.no_framing(
                     field.span,
-                    &format!("`{c}` is no byte"),
+                    &format!("`{c}` is not a single byte"),
                     "in a layout",
                     "write bytes as `\\x1b`",
                 );
@@ -152,7 +152,12 @@ impl<'a> Planner<'a, '_> {
             rest = &rest[c.len_utf8() * if doubled { 2 } else { 1 }..];
         }
         if !parts.contains(&Part::Data) {
-            return self.no_framing(field.span, "a frame has no room for its message", "no `{data}`", "add `{data}`");
+            return self.no_framing(
+                field.span,
+                "the layout has no place for the message",
+                "no `{data}`",
+                "add `{data}`",
+            );
         }
         Some((parts, field.span))
     }
@@ -163,14 +168,14 @@ impl<'a> Planner<'a, '_> {
         let name = name.trim();
         let form = match form.map(|f| Form::parse(f, false)) {
             Some(Ok(form)) => Some(form),
-            Some(Err(why)) => return self.no_framing(at, &why, "in a layout", "as in `{length :u16 big}`"),
+            Some(Err(why)) => return self.no_framing(at, &why, "in a layout", "write it as in `{length :u16 big}`"),
             None => None,
         };
         let fixed = form.clone().filter(|f| f.width().is_some() && is_whole(f));
         match (name, form, fixed) {
             ("data", None, _) => Some(Part::Data),
             ("data", Some(_), _) => {
-                self.no_framing(at, "a message has no form", "`{data}` alone", "what it is says `carries`")
+                self.no_framing(at, "`data` takes no format", "`{data}` alone", "`carries` gives its format")
             }
             ("address", None, _) => Some(Part::Address(None)),
             ("address", _, Some(form)) => Some(Part::Address(Some(form))),
@@ -178,8 +183,13 @@ impl<'a> Planner<'a, '_> {
             ("check", _, Some(form)) => Some(Part::Check(form)),
             ("number", _, Some(form)) => Some(Part::Number(form)),
             ("address" | "length" | "check" | "number", ..) => {
-                let headline = format!("`{name}` is a whole number of a fixed width");
-                self.no_framing(at, &headline, "no such form", "as in `:u8`, `:u16 little`, `:02` or `:u8 hex`")
+                let headline = format!("`{name}` needs the format of a whole number of fixed width");
+                self.no_framing(
+                    at,
+                    &headline,
+                    "another format",
+                    "write it as in `:u8`, `:u16 little`, `:02` or `:u8 hex`",
+                )
             }
             _ => {
                 let headline = format!("a frame has no part `{name}`");
@@ -209,8 +219,8 @@ impl<'a> Planner<'a, '_> {
                 Some(Counted { over: self.stretch(value)?, more: more as i32 })
             }
             _ => {
-                let help = "as in `length: count(data)` or `length: count(address .. data) + 1`";
-                self.no_framing(field.span, "what a length counts is a stretch of the frame", "not understood", help)
+                let help = "write it as in `length: count(data)` or `length: count(address .. data) + 1`";
+                self.no_framing(field.span, "`length` must count a part of the frame", "invalid", help)
             }
         }
     }
@@ -225,13 +235,8 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         };
         let Some((name, [Arg { name: None, value: over }, more @ ..], at)) = call else {
-            let help = "as in `check: sum8(data)` or `check: crc16_modbus(address .. data)`";
-            return self.no_framing(
-                field.span,
-                "a checksum is reckoned over a stretch of the frame",
-                "not understood",
-                help,
-            );
+            let help = "write it as in `check: sum8(data)` or `check: crc16_modbus(address .. data)`";
+            return self.no_framing(field.span, "`check` must be a checksum over a part of the frame", "invalid", help);
         };
         let over = self.stretch(over)?;
         if name == CRC {
@@ -241,9 +246,9 @@ impl<'a> Planner<'a, '_> {
         let known = CHECKSUMS.iter().find(|(known, _)| *known == name).filter(|_| more.is_empty());
         let Some((_, sum)) = known else {
             let names: Vec<&str> = CHECKSUMS.iter().map(|(name, _)| *name).collect();
-            let headline = format!("there is no checksum `{name}`");
-            let d = Diagnostic::error(codes::FRAMING, at, headline, "not a known one");
-            let help = format!("it is one of {}, or `crc(...)` with its parameters", listed(&names));
+            let headline = format!("unknown checksum `{name}`");
+            let d = Diagnostic::error(codes::FRAMING, at, headline, "not a built-in checksum");
+            let help = format!("use one of {}, or `crc(...)` with its parameters", listed(&names));
             self.lab.report(near::proposed(d, &near::nearest(name, &names), at).help(help));
             return None;
         };
@@ -261,9 +266,9 @@ impl<'a> Planner<'a, '_> {
         if let Some(e) = given("width").filter(|_| width.is_some_and(|w| ![8.0, 16.0, 32.0].contains(&w))) {
             return self.no_framing(
                 e.span,
-                "a cyclic redundancy check has 8, 16 or 32 bits",
-                "not so many",
-                "as in `width: 16`",
+                "the width of a CRC must be 8, 16 or 32",
+                "another width",
+                "write it as in `width: 16`",
             );
         }
         let reflected = match given("reflected").map(|e| &*e.kind) {
@@ -275,14 +280,13 @@ impl<'a> Planner<'a, '_> {
         let (Some(width), Some(polynomial), Some(initial), Some(reflected), Some(last), 5) =
             (all.0, all.1, all.2, all.3, all.4, args.len())
         else {
-            let help =
-                "as in `crc(data, width: 16, polynomial: \"1021\", initial: \"FFFF\", reflected: false, final: \"0\")`";
-            return self.no_framing(at, "a cyclic redundancy check has five parameters", "not these", help);
+            let help = "write it as in `crc(data, width: 16, polynomial: \"1021\", initial: \"FFFF\", reflected: false, final: \"0\")`";
+            return self.no_framing(at, "a CRC needs five parameters", "not these", help);
         };
         let fits = |value: u32| width == 32.0 || f64::from(value) < 2f64.powf(width);
         if ![polynomial, initial, last].into_iter().all(fits) {
-            let headline = format!("a parameter of this check has more than {width} bits");
-            return self.no_framing(at, &headline, "too large", "the polynomial is written without its highest bit");
+            let headline = format!("a parameter of this CRC has more than {width} bits");
+            return self.no_framing(at, &headline, "too large", "write the polynomial without its highest bit");
         }
         Some(Checksum::Crc(Crc { width: width as u8, polynomial, initial, reflected, last }))
     }
@@ -304,21 +308,26 @@ impl<'a> Planner<'a, '_> {
             Some((from, to)) => Some(Stretch { from, to }),
             None => {
                 let names: Vec<&str> = MARKS.iter().map(|(name, _)| *name).collect();
-                let help = format!("from one part to another, of {}", listed(&names));
-                self.no_framing(e.span, "this is no stretch of a frame", "not understood", &help)
+                let help = format!("write one part, or from one part to another, of {}", listed(&names));
+                self.no_framing(e.span, "this is not a part of the frame", "invalid", &help)
             }
         }
     }
 
     fn silence(&mut self, field: &'a Field, module: usize) -> Option<f64> {
         let FieldValue::Expr(e) = &field.value else {
-            return self.no_framing(field.span, "a silence is a time", "not one", "as in `silence: 5 ms`");
+            return self.no_framing(
+                field.span,
+                "`silence` must be a duration",
+                "not a duration",
+                "write it as in `silence: 5 ms`",
+            );
         };
         let node = self.duration_node(e, &mut Scope::module(module), "silence")?;
         let most = 1.0;
         match self.lab.known(node).filter(|s| *s <= most) {
             Some(silence) => Some(silence),
-            None => self.no_framing(e.span, "a silence is at most 1 s", "longer", "it comes before every message"),
+            None => self.no_framing(e.span, "`silence` must be at most 1 s", "too long", "it delays every message"),
         }
     }
 
@@ -336,13 +345,18 @@ impl<'a> Planner<'a, '_> {
         match (place(Mark::Length), length) {
             (None, None) => {}
             (Some(_), None) => {
-                return self.no_framing(at, "nothing says what the length counts", "here", "add `length: count(data)`");
+                return self.no_framing(
+                    at,
+                    "the frame has a length, but `length` is missing",
+                    "here",
+                    "add `length: count(data)`",
+                );
             }
             (None, Some((_, span))) => {
                 return self.no_framing(
                     *span,
-                    "a frame has no `{length}`",
-                    "counted, and never sent",
+                    "`length` is given, but the frame has no `{length}`",
+                    "never sent",
                     "add `{length :u8}`",
                 );
             }
@@ -350,7 +364,7 @@ impl<'a> Planner<'a, '_> {
                 if place > data {
                     return self.no_framing(
                         at,
-                        "a length comes before what it counts",
+                        "a length must come before the part that it counts",
                         "here",
                         "put it before `{data}`",
                     );
@@ -360,7 +374,7 @@ impl<'a> Planner<'a, '_> {
                         *span,
                         "the length does not count the message",
                         "not over `data`",
-                        "as in `count(data)`",
+                        "write it as in `count(data)`",
                     );
                 }
             }
@@ -370,7 +384,7 @@ impl<'a> Planner<'a, '_> {
             (Some(_), None) => {
                 return self.no_framing(
                     at,
-                    "nothing says how the checksum is reckoned",
+                    "the frame has a checksum, but `check` is missing",
                     "here",
                     "add `check: sum8(data)`",
                 );
@@ -378,8 +392,8 @@ impl<'a> Planner<'a, '_> {
             (None, Some((_, span))) => {
                 return self.no_framing(
                     *span,
-                    "a frame has no `{check}`",
-                    "reckoned, and never sent",
+                    "`check` is given, but the frame has no `{check}`",
+                    "never sent",
                     "add `{check :u8}`",
                 );
             }
@@ -388,20 +402,20 @@ impl<'a> Planner<'a, '_> {
                 if !parts.is_some_and(|mut parts| parts.any(|part| part != place)) {
                     return self.no_framing(
                         *span,
-                        "this checksum is over nothing",
-                        "no such stretch",
-                        "as in `sum8(begin .. data)`",
+                        "this checksum covers no part of the frame",
+                        "empty range",
+                        "write it as in `sum8(begin .. data)`",
                     );
                 }
                 let bits = check.sum.bits();
                 let Part::Check(form) = &layout[place] else { return None };
                 if form.most() < 2f64.powi(bits.into()) - 1.0 || form.scale != 1.0 {
-                    let headline = format!("a checksum of {bits} bits has no room in its form");
+                    let headline = format!("a checksum of {bits} bits does not fit its format");
                     return self.no_framing(
                         at,
                         &headline,
                         "too narrow",
-                        "as in `{check :u16 big}` or `{check :u16 hex}`",
+                        "write it as in `{check :u16 big}` or `{check :u16 hex}`",
                     );
                 }
             }
@@ -419,22 +433,22 @@ impl<'a> Planner<'a, '_> {
             [Part::Fixed(mark), ..] => (mark, None),
             [Part::Check(check), Part::Fixed(mark), ..] => (mark, Some(check)),
             _ => {
-                let help = "write the bytes behind it, as in `\"{data}\\r\"`, or a length before it";
-                return self.no_framing(at, "nothing says where a message ends", "no end and no length", help);
+                let help = "add bytes after it, as in `\"{data}\\r\"`, or a length before it";
+                return self.no_framing(at, "the end of a message is undefined", "no end mark and no length", help);
             }
         };
         if carries == Carries::Bytes {
-            return self.no_framing(at, "a byte of a message may be like its end", "no length", help);
+            return self.no_framing(at, "a message may contain the byte of its end mark", "no length", help);
         }
         if check.is_some_and(Form::is_raw) {
-            return self.no_framing(at, "a byte of the checksum may be like the end mark", "no length", help);
+            return self.no_framing(at, "the checksum may contain the byte of the end mark", "no length", help);
         }
         if mark.iter().all(|b| b.is_ascii_alphanumeric() || b"+-. ".contains(b)) {
-            let help = "a line end, a control character or a sign that messages never have";
+            let help = "use a line end, a control character or another sign that messages never contain";
             return self.no_framing(
                 at,
-                "a message may have the signs of its end in it",
-                "an end like a number or word",
+                "a message may contain the signs of its end mark",
+                "the end mark looks like a number or word",
                 help,
             );
         }

@@ -32,13 +32,23 @@ impl<'a> Planner<'a, '_> {
         let ItemKind::Driver { name, transport: of, args: given, .. } = &decl.item.kind else { return None };
         if let Some(arg) = args.first() {
             let at = arg.name.as_ref().map_or(arg.value.span, |n| n.span);
-            let help = format!("`{}` has one", name.text);
-            self.wrong(at, "a driver over the line of another one says nothing of that line", "said twice", &help);
+            let help = format!("the line belongs to `{}`", name.text);
+            self.wrong(
+                at,
+                "a driver over the line of another driver cannot have settings of the line",
+                "not allowed here",
+                &help,
+            );
             return None;
         }
         if self.under(of, decl.module).is_some() {
-            let headline = format!("`{}` has no line of its own", name.text);
-            self.wrong(transport.span, &headline, "speaks over another one", &format!("write `over {}`", of.text));
+            let headline = format!("`{}` has no line itself", name.text);
+            self.wrong(
+                transport.span,
+                &headline,
+                "it uses the line of another driver",
+                &format!("write `over {}`", of.text),
+            );
             return None;
         }
         self.transport(of, given, name.span, decl.module)

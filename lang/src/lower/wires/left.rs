@@ -32,14 +32,14 @@ impl<'a> Planner<'a, '_> {
         if !self.lab.prototype || !driver.stays_on || has_safe(wires) {
             return;
         }
-        let headline = format!("`{}` does not say how its device is made safe", driver.name);
-        let d = Diagnostic::warning(codes::NO_SAFE, driver.span, headline, "may be left on");
+        let headline =
+            format!("the driver `{}` has no `safe` line: it cannot switch its device off after a failure", driver.name);
+        let d = Diagnostic::warning(codes::NO_SAFE, driver.span, headline, "the device may stay on");
         let help = match driver.transport {
             Transport::Sila { .. } => {
-                "add a line `safe sends \"...\"`; where the driver comes from a definition, declare `param safe_call: Text` in its \
-                 capability and name the call in the asset"
+                "add a line `safe sends \"...\"`; for a driver made from a definition, declare `param safe_call: Text` in its capability and name the call in the asset"
             }
-            _ => "add a line `safe sends \"...\"`: it is sent after a run that did not end well",
+            _ => "add a line `safe sends \"...\"`: it is sent when a run fails or is stopped",
         };
         self.lab.report(d.help(help));
     }

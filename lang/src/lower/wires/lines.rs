@@ -25,8 +25,13 @@ impl<'a> Planner<'a, '_> {
             None => None,
         };
         if !of.then.is_empty() && of.then.len() + 1 != of.sends.len() {
-            let headline = format!("{} replies are expected to {} messages", of.then.len() + 1, of.sends.len());
-            self.wrong(of.then[0].span, &headline, "not one for each", "expect one for all of them, or one for each");
+            let headline = format!("{} replies are expected for {} messages", of.then.len() + 1, of.sends.len());
+            self.wrong(
+                of.then[0].span,
+                &headline,
+                "the numbers differ",
+                "expect one reply for all of them, or one for each",
+            );
             return None;
         }
         for pattern in &of.then {
@@ -52,17 +57,17 @@ impl<'a> Planner<'a, '_> {
         let help = "write `identity sends \"I4\" expects \"I4 A {<serial>}\"`";
         let span = exchange.span;
         if *framing == Framing::Calls {
-            let headline = "a server of SiLA 2 is told from others by its UUID";
-            self.wrong(span, headline, "not asked by a driver", "bind the device by it: `sila = \"UUID\"`");
+            let headline = "a server of SiLA 2 is identified by its UUID";
+            self.wrong(span, headline, "not for this driver", "bind the device by its UUID: `sila = \"UUID\"`");
             return None;
         }
         if exchange.sends.len() != 1 || exchange.until.is_some() {
-            self.wrong(span, "one question asks a device who it is", "not one question", help);
+            self.wrong(span, "`identity` needs exactly one message", "not one message", help);
             return None;
         }
         let words = exchange.expects.as_ref().map(|expects| kept_words(expects, framing)).unwrap_or_default();
         if words.is_empty() {
-            self.wrong(span, "no word of the answer says who the device is", "keeps nothing of it", help);
+            self.wrong(span, "`identity` must keep a word of the reply", "keeps nothing", help);
             return None;
         }
         Some(Identity { exchange, words })
@@ -106,8 +111,8 @@ impl<'a> Planner<'a, '_> {
         match text.chars().find(|c| "\"\\,:()[]{}".contains(*c)) {
             None => Some(text),
             Some(c) => {
-                let headline = format!("`{c}` cannot stand in a text without quotes");
-                self.wrong(at, &headline, "would be taken for a part of the call", "write `\\\"` on both sides of it");
+                let headline = format!("a text without quotes cannot contain `{c}`");
+                self.wrong(at, &headline, "would be read as a part of the call", "put `\\\"` before and after it");
                 None
             }
         }
@@ -135,8 +140,8 @@ impl<'a> Planner<'a, '_> {
                 }
                 Value::Num(n) => {
                     let unit = self.lab.shown(&n).symbol;
-                    let headline = "a device is sent a number: say in which unit";
-                    let d = Diagnostic::error(codes::DRIVER_LINE, value.span, headline, "no unit");
+                    let headline = "this number needs a unit";
+                    let d = Diagnostic::error(codes::DRIVER_LINE, value.span, headline, "the unit is missing");
                     self.lab.report(d.help(format!("write `{{... as {unit}}}`")));
                     return None;
                 }
@@ -144,7 +149,7 @@ impl<'a> Planner<'a, '_> {
                 Value::Bool(node) => Piece::Word(node, self.sent_words(&truth(), form)?),
                 _ if form.is_some() => {
                     let at = form.map_or(value.span, |f| f.span);
-                    self.wrong(at, "only numbers and words have a form", "of neither", "leave it out");
+                    self.wrong(at, "only numbers and words take a format", "not a number or word", "remove it");
                     return None;
                 }
                 Value::Text(words) if self.speech == Speech::Calls && text.parts.len() > 1 => {
@@ -156,8 +161,8 @@ impl<'a> Planner<'a, '_> {
                 }
                 Value::Nothing if self.lenient => return None,
                 Value::Nothing | Value::Unlimited => {
-                    let headline = "what a device is to be sent is not given in this lab";
-                    let d = Diagnostic::error(codes::DRIVER_LINE, value.span, headline, "not given");
+                    let headline = "a value of this message is not set in this lab";
+                    let d = Diagnostic::error(codes::DRIVER_LINE, value.span, headline, "not set");
                     self.lab.report(d.help("give it where the device is declared, or in a `between` line"));
                     return None;
                 }
@@ -204,9 +209,9 @@ impl<'a> Planner<'a, '_> {
             None => {
                 self.wrong(
                     every.span,
-                    "how often a device speaks is known before anything runs",
-                    "not a time",
-                    "as in `every 1 s`",
+                    "the interval between messages must be known before the run",
+                    "not a constant",
+                    "write it as in `every 1 s`",
                 );
                 None
             }
@@ -230,8 +235,8 @@ impl<'a> Planner<'a, '_> {
         let (text, bounds) = bounded(&expects.text);
         let bounds = match bounds {
             Some(Err(why)) => {
-                let d = Diagnostic::error(codes::DRIVER_LINE, expects.span, why, "what can it show?");
-                self.lab.report(d.help("write two numbers in the unit before them, as in `{degC in -50 .. 400}`"));
+                let d = Diagnostic::error(codes::DRIVER_LINE, expects.span, why, "invalid range");
+                self.lab.report(d.help("write two numbers in the given unit, as in `{degC in -50 .. 400}`"));
                 return None;
             }
             Some(Ok(bounds)) => Some(bounds),
@@ -251,22 +256,22 @@ impl<'a> Planner<'a, '_> {
                 crate::eval::Num { node, dimension: Dimension::one(), point: false, unit: None, literal: false }
             }
             other => {
-                self.lab.expected("a quantity that a device can tell", &other, name.span);
+                self.lab.expected("a quantity that a device can report", &other, name.span);
                 return None;
             }
         };
         let one = [Dimension::one()];
         let dimensions = if words.is_empty() { dimensions.as_slice() } else { &one };
         let [dimension] = dimensions else {
-            let headline = format!("the reply must say once what `{}` is", name.text);
+            let headline = format!("the reply must contain `{}` once", name.text);
             let d =
                 Diagnostic::error(codes::DRIVER_LINE, expects.span, headline, format!("{} values", dimensions.len()));
-            self.lab.report(d.help("write the unit in braces where the number stands, as in `\"{degC} 2\"`"));
+            self.lab.report(d.help("write the unit in braces in place of the number, as in `\"{degC} 2\"`"));
             return None;
         };
         if *dimension != n.dimension {
             let wanted = self.lab.tables.units.describe(&n.dimension, n.point);
-            let headline = format!("`{}` is {wanted}, which the unit of this reply is not", name.text);
+            let headline = format!("`{}` is {wanted}, but the unit of this reply has another dimension", name.text);
             self.lab.report(Diagnostic::error(codes::DRIVER_LINE, expects.span, headline, "another dimension"));
             return None;
         }
@@ -317,14 +322,14 @@ impl<'a> Planner<'a, '_> {
             this.wrong(
                 expects.span,
                 &headline,
-                "not told",
-                &format!("it is one of {list}: as in `{{A = {example} | B = ...}}`"),
+                "the word is missing",
+                &format!("give a text for each of {list}, as in `{{A = {example} | B = ...}}`"),
             );
         };
         let numbers = expects.slots.iter().filter(|s| matches!(s, Slot::Number(..))).count();
         let all = expects.slots.iter().filter(|s| matches!(s, Slot::Word(_))).count();
         if all != 1 || numbers != 0 {
-            wrong(self, format!("the reply must say once which word `{name}` is"));
+            wrong(self, format!("the reply must contain the word for `{name}` once"));
             return None;
         }
         let choices = expects.slots.iter().find_map(|s| match s {
@@ -332,7 +337,7 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         })?;
         if let Some(strange) = choices.iter().find(|c| !words.contains(&c.word)) {
-            wrong(self, format!("`{name}` is never `{}`", strange.word));
+            wrong(self, format!("`{name}` has no state `{}`", strange.word));
             return None;
         }
         for slot in &mut expects.slots {
@@ -388,7 +393,10 @@ fn bounded(text: &str) -> (String, Option<Result<[f64; 2], String>>) {
     let bounds = range.split_once("..").and_then(|(least, most)| Some([number(least)?, number(most)?]));
     let bounds = bounds.filter(|[least, most]| least < most);
     let whole = format!("{before}{{{}{form}{after}", unit.trim());
-    (whole, Some(bounds.ok_or_else(|| format!("`{}` are not the least and the most of something", range.trim()))))
+    (
+        whole,
+        Some(bounds.ok_or_else(|| format!("`{}` is not a range from the smallest to the largest value", range.trim()))),
+    )
 }
 
 /// The words of a truth value.

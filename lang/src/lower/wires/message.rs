@@ -30,7 +30,7 @@ impl<'a> Planner<'a, '_> {
             let asks = exchange.until.iter().map(|until| &until.asks);
             for sent in exchange.sends.iter().chain(asks) {
                 if sent.pieces.iter().any(|p| !matches!(p, Piece::Plain(_))) {
-                    self.no_message(sent.span, "what plays a file has no values in it");
+                    self.no_message(sent.span, "the message that plays a file cannot contain values");
                 }
             }
         }
@@ -61,7 +61,7 @@ impl<'a> Planner<'a, '_> {
             self.check_request(&until.asks, known);
             match &until.expects {
                 Some(expected) => self.check_answer(expected, known),
-                None => self.no_message(until.asks.span, "over HTTP nothing but an answer says that a device is ready"),
+                None => self.no_message(until.asks.span, "over HTTP only a reply can report that a device is ready"),
             }
         }
     }
@@ -93,13 +93,13 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn unknown_word(&mut self, span: Span, word: &str) {
-        let headline = format!("nothing says what `<{word}>` is");
-        let d = Diagnostic::error(codes::DRIVER_LINE, span, headline, "put in here");
-        self.lab.report(d.help(format!("an answer does, as in `expects \"201 /data/id=<{word}>\"`")));
+        let headline = format!("`<{word}>` is never set");
+        let d = Diagnostic::error(codes::DRIVER_LINE, span, headline, "used here");
+        self.lab.report(d.help(format!("keep it from a reply, as in `expects \"201 /data/id=<{word}>\"`")));
     }
 
     fn no_message(&mut self, span: Span, why: &str) {
-        self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, why.to_owned(), "not understood"));
+        self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, why.to_owned(), "invalid message"));
     }
 }
 

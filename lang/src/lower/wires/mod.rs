@@ -91,9 +91,9 @@ impl<'a> Planner<'a, '_> {
         if let (Some(every), Some(patience)) = (every, patience)
             && every >= patience
         {
-            let headline = format!("a watchdog that waits {patience} s hears something only every {every} s");
-            let d = Diagnostic::error(codes::TYPE_MISMATCH, of.span, headline, "its device stops before that");
-            self.lab.report(d.help("repeat the command at least twice in that time: one answer may be lost"));
+            let headline = format!("the watchdog waits {patience} s, but a message comes only every {every} s");
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, of.span, headline, "the device would stop before");
+            self.lab.report(d.help("repeat the command at least twice in that time: one reply may be lost"));
             return None;
         }
         Some(node)
@@ -213,8 +213,8 @@ impl<'a> Planner<'a, '_> {
             Some(holds) => holds != 0.0 || self.lab.prototype,
             None if self.lab.prototype => true,
             None => {
-                let headline = "what is said apart from commands is known before anything runs";
-                self.wrong(condition.span, headline, "changes in a run", "let it depend on what is given only");
+                let headline = "messages outside of commands cannot depend on the run";
+                self.wrong(condition.span, headline, "changes during a run", "use only values given in the lab");
                 false
             }
         }
@@ -254,8 +254,13 @@ impl<'a> Planner<'a, '_> {
             }
             WireKind::Hears { path, condition, text, every } => {
                 if matches!(driver.framing, wire::Framing::Json | wire::Framing::Calls) || driver.host.is_some() {
-                    let help = "ask for it: `reading ... asks ... expects ...`";
-                    self.wrong(w.span, "only a device on a line of its own speaks by itself", "never heard", help);
+                    let help = "query it: `reading ... asks ... expects ...`";
+                    self.wrong(
+                        w.span,
+                        "only a device with its own line can send messages by itself",
+                        "never received",
+                        help,
+                    );
                     return;
                 }
                 let told = self.heard(path, text, every, w.span, &mut scope);
@@ -313,10 +318,10 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn not_mapped(&mut self, sig: &Sig, what: &str, forms: &[String]) {
-        let headline = format!("no {what} has the form `{}`", self.form(sig));
-        let mut d = Diagnostic::error(codes::DRIVER_LINE, sig.span, headline, "nothing that is ever said");
+        let headline = format!("no {what} has the signature `{}`", self.form(sig));
+        let mut d = Diagnostic::error(codes::DRIVER_LINE, sig.span, headline, "no step ever sends this");
         for form in forms {
-            d = d.help(format!("its form is `{form}`"));
+            d = d.help(format!("its signature is `{form}`"));
         }
         self.lab.report(d);
     }
@@ -346,9 +351,9 @@ impl<'a> Planner<'a, '_> {
         let keys: Vec<Option<String>> = wires.iter().map(key).collect();
         for (i, key) in keys.iter().enumerate().filter_map(|(i, k)| Some((i, k.as_ref()?))) {
             if let Some(first) = keys[..i].iter().position(|k| k.as_ref() == Some(key)) {
-                let headline = "a driver says twice how this goes over its line";
-                let d = Diagnostic::error(codes::DRIVER_LINE, wires[i].span, headline, "said again here");
-                self.lab.report(d.because(wires[first].span, "said first here"));
+                let headline = "the driver has two lines for this";
+                let d = Diagnostic::error(codes::DRIVER_LINE, wires[i].span, headline, "the second line");
+                self.lab.report(d.because(wires[first].span, "the first line"));
             }
         }
     }

@@ -32,7 +32,7 @@ impl Planner<'_, '_> {
                     out.push(Piece::Word(node, words));
                 }
                 (Piece::Number { form, .. }, Some(false)) if form.width().is_none() => {
-                    return self.no_register(at, "a register is written as bytes");
+                    return self.no_register(at, "a value for a register needs a format in bytes");
                 }
                 (other, _) => out.push(other),
             }
@@ -43,7 +43,7 @@ impl Planner<'_, '_> {
             Piece::Word(_, words) => words.first().cloned().unwrap_or_default(),
         };
         if let Err(why) = Request::parse(&out.iter().map(sample).collect::<String>()) {
-            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, at, why, "not a request"));
+            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, at, why, "not a request of Modbus"));
             return None;
         }
         Some(out)
@@ -61,7 +61,7 @@ impl Planner<'_, '_> {
             out.push(match piece {
                 Piece::Plain(text) => Piece::Plain(self.values(&text, false, at)?),
                 Piece::Number { form, .. } if form.width().is_none() => {
-                    return self.no_register(at, "a register is told as bytes");
+                    return self.no_register(at, "a value for a register needs a format in bytes");
                 }
                 other => other,
             });
@@ -89,8 +89,8 @@ impl Planner<'_, '_> {
         if is_spoken || asked.values.is_some() || digits == 4 * usize::from(count) {
             return true;
         }
-        let headline = format!("{count} registers are asked for, and the answer is read as {} bytes", digits / 2);
-        self.wrong(at, &headline, "a register has two bytes", "ask for as many registers as the number takes");
+        let headline = format!("the reply of {count} registers is read as {} bytes", digits / 2);
+        self.wrong(at, &headline, "each register has two bytes", "read as many registers as the number takes");
         false
     }
 
@@ -111,7 +111,7 @@ impl Planner<'_, '_> {
             out.push(match slot {
                 Slot::Plain(text) => Slot::Plain(self.values(&text, false, at)?),
                 Slot::Number(_, form) if form.width().is_none() => {
-                    return self.no_register(at, "a register is read as bytes");
+                    return self.no_register(at, "a value of a register needs a format in bytes");
                 }
                 Slot::Word(mut choices) => {
                     for choice in &mut choices {
@@ -140,13 +140,13 @@ impl Planner<'_, '_> {
         };
         let all: Option<String> = text.split_whitespace().map(digits).collect();
         if all.is_none() {
-            return self.no_register(at, &format!("`{}` is nothing that registers hold", text.trim()));
+            return self.no_register(at, &format!("registers cannot hold `{}`", text.trim()));
         }
         all
     }
 
     fn no_register<T>(&mut self, at: Span, headline: &str) -> Option<T> {
-        let help = "as in `{t as degC :i16 * 10}`, `{degC :f32 swapped}`, `1` or `0x00FF`";
+        let help = "write it as in `{t as degC :i16 * 10}`, `{degC :f32 swapped}`, `1` or `0x00FF`";
         self.wrong(at, headline, "not 16 bits each", help);
         None
     }

@@ -30,9 +30,10 @@ impl Planner<'_, '_> {
                 continue;
             }
             let Some(close) = rest.find('}').filter(|_| rest.starts_with('{')) else {
-                let headline = "a brace in a reply stands for a number or, as `{_}`, for anything";
-                let d = Diagnostic::error(codes::DRIVER_LINE, of.span, headline, "not closed, or not opened");
-                self.lab.report(d.help("a brace itself is written `{{` or `}}`"));
+                let headline = "braces in a reply mark a number, or any text as `{_}`";
+                let d =
+                    Diagnostic::error(codes::DRIVER_LINE, of.span, headline, "an opening or closing brace is missing");
+                self.lab.report(d.help("write `{{` or `}}` for a brace itself"));
                 return None;
             };
             if !plain.is_empty() {
@@ -95,11 +96,16 @@ impl Planner<'_, '_> {
     /// The name under which a journal keeps what a reply says.
     fn kept_name(&mut self, name: &str, at: Span) -> Option<String> {
         if matches!(self.speech, Speech::Free | Speech::Calls) {
-            self.wrong(at, "what a server answers is kept without braces", "in braces", &format!("write `<{name}>`"));
+            self.wrong(
+                at,
+                "a value of a server's reply is kept without braces",
+                "has braces",
+                &format!("write `<{name}>`"),
+            );
             return None;
         }
         if !crate::syntax::is_name(name) {
-            self.wrong(at, "what a reply says is kept under a name", "not a name", "as in `{<serial>}`");
+            self.wrong(at, "`<...>` must contain a name", "not a name", "write it as in `{<serial>}`");
             return None;
         }
         Some(name.to_owned())

@@ -213,7 +213,12 @@ impl<'a> Planner<'a, '_> {
         });
         let Some(m) = own else {
             let headline = format!("the device has no command `{text}` without arguments");
-            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, "cannot be repeated"));
+            self.lab.report(Diagnostic::error(
+                codes::DRIVER_LINE,
+                span,
+                headline,
+                "only such a command can be repeated",
+            ));
             return None;
         };
         let line = self.lines_beside(span).iter().find_map(|w| match &w.kind {
@@ -226,7 +231,7 @@ impl<'a> Planner<'a, '_> {
         });
         let Some((sig, exchange, at)) = line else {
             let headline = format!("the driver has no line for `{text}`");
-            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, "how is it said?"));
+            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, "no line sends this"));
             return None;
         };
         self.served(Mapped::Command(m), (sig, exchange, at), instance, module, None).into_iter().next()

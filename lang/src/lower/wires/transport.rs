@@ -33,11 +33,11 @@ impl<'a> Planner<'a, '_> {
             "sila" => SILA,
             "http" => HTTP,
             _ => {
-                let headline = format!("there is no transport `{}`", name.text);
+                let headline = format!("unknown transport `{}`", name.text);
                 self.wrong(
                     name.span,
                     &headline,
-                    "not a kind of line",
+                    "not a transport",
                     "a driver speaks over `serial`, `tcp`, `http` or `sila`, or over the line of another driver",
                 );
                 return None;
@@ -47,20 +47,20 @@ impl<'a> Planner<'a, '_> {
             let Some(word) = &arg.name else {
                 self.wrong(
                     arg.value.span,
-                    "what a line has is named",
-                    "which one?",
-                    &format!("one of {}", list(known)),
+                    "settings of a line need their names",
+                    "without a name",
+                    &format!("use {}", list(known)),
                 );
                 return None;
             };
             let again = args[..i].iter().any(|a| a.name.as_ref().is_some_and(|n| n.text == word.text));
             if again || !known.contains(&word.text.as_str()) {
-                let what = if again { "is given twice" } else { "is nothing that this line has" };
+                let what = if again { "is given twice" } else { "is not a setting of this line" };
                 self.wrong(
                     word.span,
                     &format!("`{}` {what}", word.text),
                     "not expected",
-                    &format!("it has {}", list(known)),
+                    &format!("use {}", list(known)),
                 );
                 return None;
             }
@@ -69,13 +69,13 @@ impl<'a> Planner<'a, '_> {
         let missing: Vec<&str> =
             known.iter().copied().filter(|k| !OPTIONAL.contains(k) && given(k).is_none()).collect();
         if !missing.is_empty() {
-            let headline = format!("the line of this driver lacks {}", list(&missing));
+            let headline = format!("the line of this driver needs {}", list(&missing));
             let help = match name.text.as_str() {
-                "sila" => "as in `over sila(feature: \"org.example/heating/Hotplate/v1\", timeout: 5 s)`",
-                "http" => "as in `over http(timeout: 1 min)`",
-                _ => "as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`",
+                "sila" => "write it as in `over sila(feature: \"org.example/heating/Hotplate/v1\", timeout: 5 s)`",
+                "http" => "write it as in `over http(timeout: 1 min)`",
+                _ => "write it as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`",
             };
-            self.wrong(at, &headline, "nothing is taken for granted here", help);
+            self.wrong(at, &headline, "these settings have no defaults", help);
             return None;
         }
         if name.text == "sila" {
@@ -105,7 +105,7 @@ impl<'a> Planner<'a, '_> {
         let timeout = self.duration_node(e, &mut Scope::module(module), "timeout")?;
         let known = self.lab.known(timeout)?;
         if known <= 0.0 {
-            self.wrong(e.span, "no answer comes in no time", "not above 0 s", "as in `timeout: 1 s`");
+            self.wrong(e.span, "a timeout must be above 0 s", "not above 0 s", "write it as in `timeout: 1 s`");
             return None;
         }
         Some(known)
@@ -120,8 +120,8 @@ impl<'a> Planner<'a, '_> {
         let definition = match packed.transpose() {
             Ok(definition) => definition,
             Err(at) => {
-                let help = "leave it out: drivers that are made from a definition have it";
-                self.wrong(at, "this is no definition of a feature", "not understood", help);
+                let help = "remove it: only drivers made from a definition have it";
+                self.wrong(at, "this is not a definition of a feature", "invalid", help);
                 return None;
             }
         };
@@ -136,7 +136,7 @@ impl<'a> Planner<'a, '_> {
             }
             _ => {
                 let help = "originator, category, identifier, version: `\"org.example/heating/Hotplate/v1\"`";
-                self.wrong(feature.span, "a feature is named by its full identifier", "not one", help);
+                self.wrong(feature.span, "name a feature by its full identifier", "not one", help);
                 None
             }
         }
@@ -145,7 +145,12 @@ impl<'a> Planner<'a, '_> {
     fn serial(&mut self, baud: &'a Expr, frame: &'a Expr, module: usize) -> Option<Transport> {
         let rate = self.plain_number(baud, module).filter(|b| BAUDS.contains(b) && b.fract() == 0.0);
         let Some(rate) = rate else {
-            self.wrong(baud.span, "a baud rate is a whole number", "not one", "as in `baud: 9600`");
+            self.wrong(
+                baud.span,
+                "a baud rate must be a whole number",
+                "not a whole number",
+                "write it as in `baud: 9600`",
+            );
             return None;
         };
         let bits = match &*frame.kind {
@@ -157,7 +162,7 @@ impl<'a> Planner<'a, '_> {
         };
         let Some((data, parity, stop)) = bits else {
             let help = "data bits, parity, stop bits, as in `frame: \"8N1\"` or `frame: \"7E1\"`";
-            self.wrong(frame.span, "this is no form of characters on a serial line", "not understood", help);
+            self.wrong(frame.span, "this is not a frame format of a serial line", "invalid", help);
             return None;
         };
         let parity = char::from(parity);
@@ -177,9 +182,9 @@ impl<'a> Planner<'a, '_> {
         if good.is_none() {
             self.wrong(
                 e.span,
-                "this is no header",
-                "not understood",
-                "a name and a value, as in `\"Accept: text/json\"`",
+                "this is not a header",
+                "invalid",
+                "write a name and a value, as in `\"Accept: text/json\"`",
             );
         }
         good.map(Some)
@@ -201,9 +206,9 @@ impl<'a> Planner<'a, '_> {
         }
         let declared = names.visible(module).filter(|(_, id)| is_framing(*id)).map(|(name, _)| name);
         let all: Vec<&str> = declared.chain(BUILT_IN.iter().map(|(name, _)| *name)).collect();
-        let mut d = Diagnostic::error(codes::DRIVER_LINE, e.span, "there is no such framing", "not a known one");
+        let mut d = Diagnostic::error(codes::DRIVER_LINE, e.span, "unknown framing", "not declared");
         d.help.extend(near::question(&near::nearest(word, &all)));
-        let d = d.help(format!("it is one of {}", list(&all)));
+        let d = d.help(format!("use one of {}", list(&all)));
         self.lab.report(d.help("declare one: `framing NAME { carries: text, frame: \"{data}\\r\" }`"));
         None
     }
@@ -226,21 +231,26 @@ impl<'a> Planner<'a, '_> {
             (None, None) | (Some(None), Some(_)) => Some(()),
             (Some(Some(form)), Some(address)) => {
                 let written =
-                    address.parse::<f64>().map_err(|_| "it is no number".to_owned()).and_then(|n| form.write(n));
+                    address.parse::<f64>().map_err(|_| "it is not a number".to_owned()).and_then(|n| form.write(n));
                 if let Err(why) = written {
-                    let headline = format!("`{address}` is no address in this framing: {why}");
-                    self.wrong(at, &headline, "does not fit", "the framing says how it is written");
+                    let headline = format!("`{address}` is not an address of this framing: {why}");
+                    self.wrong(at, &headline, "does not fit", "the framing defines the format of an address");
                     return None;
                 }
                 Some(())
             }
             (Some(_), None) => {
-                self.wrong(at, "this framing needs the `address` of the device", "no address", "as in `address: 1`");
+                self.wrong(
+                    at,
+                    "this framing needs the `address` of the device",
+                    "no address",
+                    "write it as in `address: 1`",
+                );
                 None
             }
             (None, Some(_)) => {
-                let help = "leave it out, or give the framing an `{address}`";
-                self.wrong(at, "this framing has no room for an address", "never sent", help);
+                let help = "remove it, or add `{address}` to the framing";
+                self.wrong(at, "this framing has no place for an address", "never sent", help);
                 None
             }
         }
@@ -252,7 +262,12 @@ impl<'a> Planner<'a, '_> {
         }
         let number = self.plain_number(e, module).filter(|n| n.fract() == 0.0 && (0.0..1e6).contains(n));
         if number.is_none() {
-            self.wrong(e.span, "an address is a whole number or a text", "not one", "as in `address: 1`");
+            self.wrong(
+                e.span,
+                "an address must be a whole number or a text",
+                "another value",
+                "write it as in `address: 1`",
+            );
         }
         number.map(|n| format!("{n}"))
     }

@@ -21,8 +21,8 @@ pub fn format(file: FileId, text: &str) -> Result<String, Vec<Diagnostic>> {
     let place = Span::new(file, 0, 0);
     let headline = "this file cannot be formatted without changing it";
     Err(vec![
-        Diagnostic::error(codes::SYNTAX, place, headline, "it stays as it is")
-            .help("please report this file as a fault of the formatter"),
+        Diagnostic::error(codes::SYNTAX, place, headline, "the file is unchanged")
+            .help("this is a bug in the formatter: please report it with the file"),
     ])
 }
 

@@ -50,7 +50,7 @@ impl Lower<'_> {
                     "this expression is too long",
                     "too many operators in one expression",
                 )
-                .help("give parts of it a name with `let`"),
+                .help("split it into named parts with `let`"),
             );
             return self.error_expr(span);
         }
@@ -116,8 +116,8 @@ impl Lower<'_> {
                         code => {
                             let span = self.place(start + at - 1, start + at + 1);
                             let (headline, help) = match code {
-                                Some(_) => ("a brace stands for a value here", "write `{{` or `}}`"),
-                                None => ("a byte has two hexadecimal digits", "as in `\\x02`"),
+                                Some(_) => ("a brace starts a value here", "write `{{` or `}}`"),
+                                None => ("a byte needs two hexadecimal digits", "write it as in `\\x02`"),
                             };
                             self.report(Diagnostic::error(codes::SYNTAX, span, headline, "here").help(help));
                         }
@@ -128,9 +128,9 @@ impl Lower<'_> {
                     self.report(
                         Diagnostic::error(codes::SYNTAX, span, format!("`\\{c}` has no meaning in a text"), "here")
                             .help(
-                                "a text knows `\\n`, `\\r`, `\\t`, `\\\"` and `\\\\`; what goes over a line also `\\x02`, a byte",
+                                "a text may contain `\\n`, `\\r`, `\\t`, `\\\"` and `\\\\`; a message to a device also a byte, `\\x02`",
                             )
-                            .fix("write the backslash itself", span, format!("\\\\{c}")),
+                            .fix("write a backslash", span, format!("\\\\{c}")),
                     );
                     text.push('\\');
                     text.push(c);
@@ -229,7 +229,7 @@ impl Lower<'_> {
                 }
                 self.report(
                     Diagnostic::error(codes::SYNTAX, span, "`:` is not expected in this argument", "after a value")
-                        .help("a named argument is `name: value`, a sum over a set is `sum(s in set: value of s)`"),
+                        .help("write a named argument as `name: value`, and a sum over a set as `sum(s in set: value of s)`"),
                 );
                 return ExprKind::Error;
             }

@@ -123,8 +123,8 @@ impl<'a> Lower<'a> {
             Ok(1) => Some(1),
             number => {
                 let span = self.span(&version);
-                let headline = format!("`mtx {}` is not a version of the language", version.as_str());
-                self.report(Diagnostic::error(codes::SYNTAX, span, headline, "the version is `mtx 1`"));
+                let headline = format!("`mtx {}` is not a known version of the language", version.as_str());
+                self.report(Diagnostic::error(codes::SYNTAX, span, headline, "the known version is `mtx 1`"));
                 number.ok()
             }
         }
@@ -174,7 +174,7 @@ impl<'a> Lower<'a> {
     }
 
     fn too_many_branches(&mut self, span: Span) {
-        let headline = format!("more than {MAX_BRANCHES} branches in one `if`");
+        let headline = format!("this `if` has more than {MAX_BRANCHES} branches");
         self.report(Diagnostic::error(codes::SYNTAX, span, headline, "one too many"));
     }
 

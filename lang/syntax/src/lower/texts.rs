@@ -51,9 +51,14 @@ impl Lower<'_> {
                 let (brace, other) =
                     if rest.starts_with('{') { ("{", "no `}` after it") } else { ("}", "no `{` before it") };
                 self.report(
-                    Diagnostic::error(codes::SYNTAX, place, format!("`{brace}` in a text stands for a value"), other)
-                        .help(format!("a brace itself is written `{brace}{brace}`"))
-                        .guess("write the brace itself", place, format!("{brace}{brace}")),
+                    Diagnostic::error(
+                        codes::SYNTAX,
+                        place,
+                        format!("`{brace}` in a text starts or ends a value"),
+                        other,
+                    )
+                    .help(format!("write `{brace}{brace}` for the brace itself"))
+                    .guess("write the brace itself", place, format!("{brace}{brace}")),
                 );
                 at += 1;
                 continue;

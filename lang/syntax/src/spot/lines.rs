@@ -10,8 +10,8 @@ pub(super) fn function_call(spot: &Spot) -> Option<Mistake> {
     }
     let rest = spot.after.get(verb.len()..)?;
     let (headline, help) = match rest.chars().next()? {
-        '(' => ("a step is written without brackets", "write for example `heat plate to 80 degC`"),
-        '.' | '[' | ':' => ("a step starts with a verb", "write for example `heat plate to 80 degC`"),
+        '(' => ("a step has no brackets", "write for example `heat plate to 80 degC`"),
+        '.' | '[' | ':' => ("a step must start with a verb", "write for example `heat plate to 80 degC`"),
         _ => return None,
     };
     Some(Mistake::new(headline, "this reads as a value").help(help))
@@ -23,8 +23,8 @@ pub(super) fn because(spot: &Spot) -> Option<Mistake> {
     if spot.only == Rule::only_stmt || spot.token != "because" || !asks {
         return None;
     }
-    let mistake = Mistake::new("`because` explains a failure, and none is named", "nothing to explain");
-    Some(mistake.help("name the failure before it: `else not_enough because \"...\"`"))
+    let mistake = Mistake::new("`because` needs the name of a failure before it", "no failure is named");
+    Some(mistake.help("name the failure: `else not_enough because \"...\"`"))
 }
 
 /// `command heat { effect ... }`: what follows a verb stands below it.
@@ -32,8 +32,8 @@ pub(super) fn braced_clauses(spot: &Spot) -> Option<Mistake> {
     if spot.form() != "command" || spot.token != "{" {
         return None;
     }
-    let mistake = Mistake::new("a command has no block", "its clauses stand below it, without braces");
-    Some(mistake.help("write each of `says`, `needs`, `effect` and `takes` on a line of its own below"))
+    let mistake = Mistake::new("a command has no block", "its clauses go below it, without braces");
+    Some(mistake.help("write each of `says`, `needs`, `effect` and `takes` on its own line below"))
 }
 
 /// `state open: Bool = false` in an asset: what its kind has stands in a capability.
@@ -44,8 +44,8 @@ pub(super) fn of_a_capability(spot: &Spot) -> Option<Mistake> {
     {
         return None;
     }
-    let mistake = Mistake::new(format!("`{word}` stands in a capability, not in an asset"), "no line of an asset");
-    let help = "declare it in a capability, `capability Opens: Body { ... }`, and give that to the asset: `asset Valve: Opens { ... }`";
+    let mistake = Mistake::new(format!("`{word}` belongs in a capability, not in an asset"), "not a line of an asset");
+    let help = "declare it in a capability, `capability Opens: Body { ... }`, and give the asset this capability: `asset Valve: Opens { ... }`";
     Some(mistake.help(help).at(spot.start, spot.start + word.len()))
 }
 
@@ -123,7 +123,7 @@ pub(super) fn unknown_item(spot: &Spot) -> Option<Mistake> {
         let found = spot.token;
         return Some(Mistake::new(
             format!("`{found}` is not expected between declarations"),
-            "no declaration starts like this",
+            "not the start of a declaration",
         ));
     }
     let foreign = FOREIGN.iter().find(|(other, _)| *other == word).map(|(_, ours)| *ours);
@@ -185,21 +185,23 @@ pub(super) fn out_of_place(spot: &Spot) -> Option<Mistake> {
     }
     let word = spot.token;
     let (headline, help) = match word {
-        "else" => ("`else` has no `if` or `try`", "it stands right after the `}` of an `if` or a `try`"),
+        "else" => ("`else` has no `if` or `try`", "write it right after the `}` of an `if` or a `try`"),
         "while" => ("`while` does not start a step", "write `repeat while CONDITION max N { }`"),
         "on" => (
-            "`on` handles a failure of nothing",
-            "it stands right after the `}` of a `step`, `sequence`, `parallel`, `try`, `keep` or `within`",
+            "`on` has no block before it",
+            "write it right after the `}` of a `step`, `sequence`, `parallel`, `try`, `keep` or `within`",
         ),
         "takes" | "needs" | "presumes" | "warns" | "effect" | "says" | "option" | "fails" => (
-            "a clause of a skill stands before its block",
-            "write it on a line between the words of the skill and its `{`; a primitive, `extern skill`, has no block",
+            "a clause of a skill must come before its block",
+            "write it on a line between the signature of the skill and its `{`; a primitive, `extern skill`, has no block",
         ),
-        "finally" => ("`finally` belongs to nothing", "it stands right after the `}` of a block"),
+        "finally" => ("`finally` has no block before it", "write it right after the `}` of a block"),
         "timeout" => {
-            ("`timeout` belongs to nothing", "it stands after `wait until CONDITION` or `hold CONDITION for TIME`")
+            ("`timeout` has no wait before it", "write it after `wait until CONDITION` or `hold CONDITION for TIME`")
         }
-        word if ITEM_WORDS.contains(&word) => ("a declaration stands outside of steps", "close the block above first"),
+        word if ITEM_WORDS.contains(&word) => {
+            ("a declaration cannot be inside a workflow or skill", "close the block above it first")
+        }
         _ => return None,
     };
     Some(Mistake::new(headline, "here").help(help))
@@ -214,9 +216,9 @@ pub(super) fn second_form(spot: &Spot) -> Option<Mistake> {
     }
     let found = spot.token;
     let last = last_word(spot.before);
-    let mistake = Mistake::new(format!("`{found}` is not expected after `{last}`"), "the line can be read up to here");
+    let mistake = Mistake::new(format!("`{found}` is not expected after `{last}`"), "the line is correct up to here");
     Some(match spot.only {
-        Rule::only_stmt if found.starts_with(char::is_alphabetic) => mistake.help("each step stands on its own line"),
+        Rule::only_stmt if found.starts_with(char::is_alphabetic) => mistake.help("write each step on its own line"),
         _ => mistake,
     })
 }

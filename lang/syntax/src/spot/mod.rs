@@ -143,7 +143,7 @@ impl<'a> Spot<'a> {
             last => format!("{} is expected after `{last}`", either(&words)),
         };
         if words.is_empty() {
-            return Mistake::new(format!("{found} is not expected here"), "the line can be read up to here");
+            return Mistake::new(format!("{found} is not expected here"), "the line is correct up to here");
         }
         Mistake::new(format!("expected {}, found {found}", either(&words)), label)
     }

@@ -40,16 +40,16 @@ pub(super) fn lookalike(spot: &Spot) -> Option<Mistake> {
     let (sign, plain) = SIGNS.iter().find(|(sign, _)| *sign == first)?;
     let end = spot.at + sign.len_utf8();
     let headline = match *plain {
-        " " => "this blank is a special one".to_owned(),
+        " " => "this is a special blank character".to_owned(),
         "\"" => format!("`{sign}` is not a plain quote"),
-        _ => format!("`{sign}` is not a sign of the language"),
+        _ => format!("the language has no sign `{sign}`"),
     };
     Some(Mistake::new(headline, format!("write `{plain}`")).fix(format!("write `{plain}`"), spot.at, end, *plain))
 }
 
 pub(super) fn control(spot: &Spot) -> Option<Mistake> {
     let first = spot.token.chars().next().filter(|c| c.is_control() || *c == '\u{feff}' || *c == '\u{fffd}')?;
-    let headline = format!("the file holds a character that is no text (U+{:04X})", u32::from(first));
+    let headline = format!("the file contains a control character (U+{:04X})", u32::from(first));
     Some(Mistake::new(headline, "here"))
 }
 
@@ -58,7 +58,7 @@ pub(super) fn comment(spot: &Spot) -> Option<Mistake> {
     if sign == "--" && !spot.is_at_start() {
         return None;
     }
-    let mistake = Mistake::new(format!("`{sign}` does not start a comment"), "a comment starts with `//`");
+    let mistake = Mistake::new(format!("`{sign}` does not start a comment"), "start a comment with `//`");
     Some(mistake.fix("write `//`", spot.at, spot.at + sign.len(), "//"))
 }
 
@@ -66,7 +66,7 @@ pub(super) fn quotes(spot: &Spot) -> Option<Mistake> {
     let inner = spot.after.strip_prefix('\'')?;
     let end = inner.find('\'')?;
     let text = inner.get(..end)?;
-    let mistake = Mistake::new("a text stands in double quotes", format!("write `\"{text}\"`"));
+    let mistake = Mistake::new("a text needs double quotes", format!("write `\"{text}\"`"));
     Some(mistake.fix("use double quotes", spot.at, spot.at + end + 2, format!("\"{text}\"")))
 }
 
@@ -119,7 +119,7 @@ pub(super) fn reaction_arrow(spot: &Spot) -> Option<Mistake> {
         (">", "->"),
     ];
     let (sign, ours) = SIGNS.iter().find(|(sign, _)| spot.after.starts_with(sign))?;
-    let mistake = Mistake::new(format!("a reaction is written with `{ours}`"), format!("write `{ours}`"));
+    let mistake = Mistake::new(format!("write a reaction with `{ours}`"), format!("write `{ours}`"));
     let (title, end) = (format!("write `{ours}`"), spot.at + sign.len());
     // An equals sign may stand for either arrow.
     Some(match sign.starts_with("=") && !sign.ends_with('>') {
@@ -140,11 +140,11 @@ pub(super) fn equals(spot: &Spot) -> Option<Mistake> {
     let end = spot.at + spot.token.len();
     match spot.token {
         "=" if condition => {
-            let mistake = Mistake::new("`=` gives a value, `==` compares", "write `==` in a condition");
+            let mistake = Mistake::new("`=` defines a value; `==` compares", "write `==` in a condition");
             Some(mistake.fix("write `==`", spot.at, end, "=="))
         }
         "==" if !condition && spot.expects("`=`") => {
-            let mistake = Mistake::new("`==` compares, `=` gives a value", "write `=` in a definition");
+            let mistake = Mistake::new("`==` compares; `=` defines a value", "write `=` in a definition");
             Some(mistake.fix("write `=`", spot.at, end, "="))
         }
         _ => None,
@@ -161,7 +161,7 @@ pub(super) fn assignment(spot: &Spot) -> Option<Mistake> {
         return None;
     }
     let (name, sign) = (spot.before, spot.token);
-    let mistake = Mistake::new(format!("a step cannot change `{name}`"), "`let` gives a name to a value");
+    let mistake = Mistake::new(format!("a step cannot change `{name}`"), "use `let` for a new value");
     Some(mistake.guess(format!("write `let {name} {sign} ...`"), spot.start, spot.start, "let "))
 }
 
@@ -169,6 +169,6 @@ pub(super) fn assignment(spot: &Spot) -> Option<Mistake> {
 fn both_ways(spot: &Spot) -> Option<Mistake> {
     const SIGNS: &[&str] = &["<==>", "<-->", "<=>", "==>", "-->", "->", "=>", "==", "="];
     let sign = SIGNS.iter().find(|sign| spot.after.starts_with(**sign))?;
-    let mistake = Mistake::new("an equilibrium is written with `<->`".to_owned(), "write `<->`".to_owned());
+    let mistake = Mistake::new("write an equilibrium with `<->`".to_owned(), "write `<->`".to_owned());
     Some(mistake.fix("write `<->`".to_owned(), spot.at, spot.at + sign.len(), "<->"))
 }

@@ -7,7 +7,7 @@ pub(super) fn decimal_comma(spot: &Spot) -> Option<Mistake> {
     if !spot.before.ends_with(|c: char| c.is_ascii_digit()) || !next.starts_with(|c: char| c.is_ascii_digit()) {
         return None;
     }
-    let mistake = Mistake::new("a number is written with a decimal point", "write `.`");
+    let mistake = Mistake::new("write a number with a decimal point", "write `.`");
     Some(mistake.guess("write a point", spot.at, spot.at + 1, "."))
 }
 
@@ -17,8 +17,8 @@ pub(super) fn fractional_power(spot: &Spot) -> Option<Mistake> {
     let base = spot.before.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('-').strip_suffix('^')?;
     let of_unit = base.ends_with(|c: char| c.is_alphabetic() || matches!(c, '%' | '°'));
     (of_unit && spot.is_tight() && digits.starts_with(|c: char| c.is_ascii_digit())).then(|| {
-        Mistake::new("a unit has whole powers", "this power is none")
-            .help("write a root as a factor of its own: `1e-3 1/s * sqrt(1 mol/kg)`")
+        Mistake::new("the powers in a unit must be whole numbers", "not a whole number")
+            .help("write a root as a separate factor: `1e-3 1/s * sqrt(1 mol/kg)`")
     })
 }
 
@@ -26,7 +26,7 @@ pub(super) fn fractional_power(spot: &Spot) -> Option<Mistake> {
 pub(super) fn bare_point(spot: &Spot) -> Option<Mistake> {
     let next = spot.after.strip_prefix('.')?;
     if next.starts_with(|c: char| c.is_ascii_digit()) {
-        let mistake = Mistake::new("a number starts with a digit", format!("write `0{}`", spot.token));
+        let mistake = Mistake::new("a number must start with a digit", format!("write `0{}`", spot.token));
         return Some(mistake.fix("add `0`", spot.at, spot.at, "0"));
     }
     let number = spot.is_tight() && last_word(spot.before).starts_with(|c: char| c.is_ascii_digit());
@@ -44,7 +44,7 @@ pub(super) fn range(spot: &Spot) -> Option<Mistake> {
     if spot.is_tight() || !ends || next.starts_with('.') {
         return None;
     }
-    let mistake = Mistake::new("a range is written with `..`", format!("write `{last} ..`"));
+    let mistake = Mistake::new("write a range with `..`", format!("write `{last} ..`"));
     // Between wells nothing else is meant; between numbers it may be a decimal point.
     Some(match last.starts_with(|c: char| c.is_ascii_digit()) {
         true => mistake.guess("write `..`", spot.at, spot.at + 1, ".."),
@@ -68,7 +68,7 @@ pub(super) fn split_unit(spot: &Spot) -> Option<Mistake> {
     }
     let gap = spot.start + spot.before.len();
     let whole = format!("{unit}{}", spot.token);
-    let mistake = Mistake::new("a unit is one word", format!("write `{whole}`"));
+    let mistake = Mistake::new("write a unit as one word", format!("write `{whole}`"));
     let title = format!("write `{whole}`");
     // The metre and the day are units by themselves.
     Some(match unit {
@@ -94,7 +94,7 @@ pub(super) fn colon(spot: &Spot) -> Option<Mistake> {
         return Some(Mistake::new(headline, "choose another name").at(spot.start, end));
     }
     if spot.token == "=" {
-        let mistake = Mistake::new("a field is written with `:`", format!("write `{name}: ...`"));
+        let mistake = Mistake::new("write a field with `:`", format!("write `{name}: ...`"));
         // `=` before a type declares a thing: the brace above may not have been closed.
         let thing = spot.after[1..].trim_start().starts_with(char::is_uppercase);
         return Some(match thing {
@@ -123,7 +123,7 @@ pub(super) fn instance(spot: &Spot) -> Option<Mistake> {
         Some(ty) => {
             let colon = spot.start + spot.before.len() - sign.len();
             let blank = if colon == end { " " } else { "" };
-            let headline = format!("`{name}` is a thing: it is declared with `=`");
+            let headline = format!("`{name}` is a thing: declare it with `=`");
             (headline, (colon, colon + 1, format!("{blank}=")), format!("{} {}", ty.trim_start(), spot.after))
         }
         None if sign.is_empty() => {
@@ -151,11 +151,11 @@ pub(super) fn lab_line(spot: &Spot) -> Option<Mistake> {
         return None;
     }
     if first.starts_with(char::is_uppercase) && spot.reads(&format!("x = {line}")) {
-        let mistake = Mistake::new(format!("this `{first}` has no name"), "what is it called?");
+        let mistake = Mistake::new(format!("this `{first}` has no name"), "a name is missing");
         return Some(mistake.at(spot.start, spot.start + first.len()).help(format!("write `name = {first} ...`")));
     }
     crate::is_step(&line).then(|| {
-        let mistake = Mistake::new("a step stands in a workflow, not in a lab", "this reads as a step");
+        let mistake = Mistake::new("a step belongs in a workflow, not in a lab", "this reads as a step");
         mistake.at(spot.start, spot.start + first.len())
     })
 }
@@ -167,8 +167,8 @@ pub(super) fn value_with_equals(spot: &Spot) -> Option<Mistake> {
     if !is_field(spot.only) || !is_word(name) || !value {
         return None;
     }
-    let mistake = Mistake::new("a value is written with `:`", format!("write `{name}: {}`", spot.token))
-        .help("`=` stands before the type of a thing: `beaker = Beaker250mL`");
+    let mistake = Mistake::new("write a value with `:`", format!("write `{name}: {}`", spot.token))
+        .help("use `=` before the type of a thing: `beaker = Beaker250mL`");
     Some(mistake.fix("write `:`", spot.start + name.len(), spot.start + spot.before.len(), ":"))
 }
 
@@ -197,12 +197,12 @@ pub(super) fn missing_of(spot: &Spot) -> Option<Mistake> {
     }
     let (token, last) = (spot.token, last_word(number));
     let headline = format!("`{token}` is not expected after `{unit}`");
-    let mistake = Mistake::new(headline, "a unit is one word");
+    let mistake = Mistake::new(headline, "write a unit as one word");
     if matches!(unit, "deg" | "degree" | "degrees") && matches!(token, "C" | "F") {
         let start = spot.start + spot.before.len() - unit.len();
         return Some(mistake.fix(format!("write `deg{token}`"), start, spot.end, format!("deg{token}")));
     }
-    let mistake = mistake.help(format!("an amount of something is written with `of`: `{last} {unit} of {token}`"));
+    let mistake = mistake.help(format!("write an amount of a substance with `of`: `{last} {unit} of {token}`"));
     // Elsewhere another word may be missing: `transfer 50 uL stock to vial`.
     Some(match spot.only {
         Rule::only_lab_line | Rule::only_fill => mistake.fix("add `of`", spot.at, spot.at, "of "),

@@ -24,14 +24,14 @@ impl Reader<'_> {
             [CERTIFICATE, FINGERPRINT, USER, PASSWORD, LOCK].map(|key| self.text(table, key).map(|text| (key, text)));
         let Place::Sila(server) = place else {
             for (key, (_, at)) in [certificate, print, user, password, lock].into_iter().flatten() {
-                self.wrong(at, &format!("`{key}` belongs to a server of SiLA 2"), "this is none", None);
+                self.wrong(at, &format!("`{key}` is only for a SiLA 2 server"), "this is not one", None);
             }
             return;
         };
         match (certificate, print) {
             (Some(_), Some((_, (_, at)))) => {
-                let headline = "a server is trusted by its certificate or by its fingerprint";
-                self.wrong(at, headline, "one or the other", None);
+                let headline = "give either the certificate or the fingerprint of a server";
+                self.wrong(at, headline, "both are given", None);
             }
             (Some((_, (path, _))), None) => server.trust = SilaTrust::Certificate(path),
             (None, Some((_, (text, at)))) => match fingerprint(&text) {
@@ -39,34 +39,45 @@ impl Reader<'_> {
                 None => {
                     let help =
                         "write the SHA-256 of the certificate: `openssl x509 -in FILE -noout -fingerprint -sha256`";
-                    self.wrong(at, "a fingerprint is 32 bytes in hexadecimal", "it is none", Some(help.to_owned()));
+                    self.wrong(
+                        at,
+                        "a fingerprint must have 32 bytes in hexadecimal",
+                        "not a fingerprint",
+                        Some(help.to_owned()),
+                    );
                 }
             },
             (None, None) => {}
         }
         match (user, password) {
             (Some((_, (_, at))), Some(_)) if server.trust == SilaTrust::None => {
-                let help = format!("say whom it is trusted by: `{FINGERPRINT} = ...` or `{CERTIFICATE} = ...`");
-                self.wrong(at, "a password is not sent without encryption", "to this server", Some(help));
+                let help = format!("add `{FINGERPRINT} = ...` or `{CERTIFICATE} = ...`");
+                self.wrong(
+                    at,
+                    "a password cannot be sent without encryption",
+                    "this server has no encryption",
+                    Some(help),
+                );
             }
             (Some((_, (user, _))), Some((_, (variable, _)))) => server.user = Some((user, variable)),
             (None, None) => {}
             (Some((_, (_, at))), None) => {
-                let help = format!("`{PASSWORD} = \"NAME\"` names the variable of the environment that holds it");
-                self.wrong(at, "a user has a password", "without one", Some(help));
+                let help = format!("add `{PASSWORD} = \"NAME\"` with the environment variable that holds it");
+                self.wrong(at, "a user needs a password", "missing", Some(help));
             }
-            (None, Some((_, (_, at)))) => self.wrong(at, "a password belongs to a user", "without one", None),
+            (None, Some((_, (_, at)))) => self.wrong(at, "a password needs a user", "missing", None),
         }
         let Some((_, (text, at))) = lock else { return };
         match seconds(&text) {
             Some(seconds) if (SHORTEST..=LONGEST).contains(&seconds) => server.lock = Some(seconds),
             other => {
-                let help = "the server lets go when it hears nothing for so long: `lock = \"10 min\"`".to_owned();
+                let help =
+                    "the server releases the lock after this time without a message: `lock = \"10 min\"`".to_owned();
                 let headline = match other {
-                    Some(_) => "a lock lasts from 10 s to 168 h",
-                    None => "a lock lasts for a time, as in `\"10 min\"`",
+                    Some(_) => "a lock must last from 10 s to 168 h",
+                    None => "a lock needs a duration, as in `\"10 min\"`",
                 };
-                self.wrong(at, headline, "not this", Some(help));
+                self.wrong(at, headline, "not such a duration", Some(help));
             }
         }
     }

@@ -24,7 +24,7 @@ pub struct Cavro {
 impl Cavro {
     pub(super) fn new(oem: bool, address: Option<&str>) -> Result<Self, String> {
         let number = address.and_then(|a| a.parse::<u8>().ok()).filter(|n| (1..=15).contains(n));
-        let number = number.ok_or("the address of a pump is 1 to 15, one more than its switch says")?;
+        let number = number.ok_or("the address of a pump is 1 to 15, one more than its switch position")?;
         Ok(Cavro { oem, address: b'0' + number, sequence: 0 })
     }
 
@@ -57,7 +57,7 @@ impl Cavro {
                 };
                 Ok(Reply { text, busy: status & READY == 0, is_error: error != 0 })
             }
-            other => Err(Garbled::new(format!("`{}` is no answer of a pump", super::shown(other)))),
+            other => Err(Garbled::new(format!("`{}` is not a reply of a pump", super::shown(other)))),
         }))
     }
 
@@ -133,7 +133,7 @@ fn checksum(bytes: &[u8]) -> u8 {
 fn plain(bytes: &[u8]) -> Result<String, Garbled> {
     let good = bytes.iter().all(|b| (0x20..0x7f).contains(b));
     let text = std::str::from_utf8(bytes).ok().filter(|_| good);
-    text.map(str::to_owned).ok_or_else(|| Garbled::new(format!("`{}` is no text", super::shown(bytes))))
+    text.map(str::to_owned).ok_or_else(|| Garbled::new(format!("`{}` is not text", super::shown(bytes))))
 }
 
 fn number_of(error: &str) -> u8 {

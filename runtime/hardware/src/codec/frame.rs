@@ -87,7 +87,8 @@ impl Frame {
     pub(super) fn request(&mut self, text: &str) -> Result<Vec<u8>, String> {
         let data = match self.frames.carries {
             Carries::Modbus => modbus::request(text)?,
-            _ => bytes(text).ok_or_else(|| format!("`{}` has characters that are no bytes", text.escape_debug()))?,
+            _ => bytes(text)
+                .ok_or_else(|| format!("`{}` contains characters that are not bytes", text.escape_debug()))?,
         };
         self.number += 1;
         self.put(Way::Request, &data, self.number)
@@ -105,7 +106,7 @@ impl Frame {
     pub(super) fn reply(&mut self, reply: &Reply) -> Result<Vec<u8>, String> {
         let data = match (self.frames.carries, &self.asked) {
             (Carries::Modbus, Some(asked)) => modbus::answer(asked, reply)?,
-            _ => bytes(&reply.text).ok_or("an answer has characters that are no bytes")?,
+            _ => bytes(&reply.text).ok_or("a reply contains characters that are not bytes")?,
         };
         self.put(Way::Reply, &data, self.heard)
     }
@@ -186,7 +187,7 @@ impl Frame {
     fn put(&self, way: Way, data: &[u8], number: u64) -> Result<Vec<u8>, String> {
         let layout = self.layout(way);
         let places = self.places(way, layout, data.len());
-        let long = || format!("a message of {} bytes has no room in a frame", data.len());
+        let long = || format!("a message of {} bytes does not fit into a frame", data.len());
         let mut out = Vec::new();
         for part in layout {
             match part {
@@ -201,7 +202,7 @@ impl Frame {
                 Part::Check(form) => out.resize(out.len() + form.width().unwrap_or_default(), 0),
                 Part::Number(form) => {
                     let written = form.write(wrapped(number, Some(form)) as f64)?;
-                    out.extend(bytes(&written).ok_or("a number is some bytes")?);
+                    out.extend(bytes(&written).ok_or("a number needs some bytes")?);
                 }
             }
         }
@@ -227,11 +228,11 @@ impl Frame {
         let at = layout.iter().position(|p| matches!(p, Part::Check(_)));
         let (Some(at), Some(check)) = (at, &self.frames.check) else { return Ok(None) };
         let Part::Check(form) = &layout[at] else { return Ok(None) };
-        let parts = check.over.parts(layout).ok_or("the checksum is over nothing")?;
+        let parts = check.over.parts(layout).ok_or("the checksum covers no bytes")?;
         let over: Vec<u8> =
             parts.filter(|part| *part != at).flat_map(|part| frame[places[part].clone()].iter().copied()).collect();
         let written = form.write(check.sum.of(&over).into())?;
-        let bytes = bytes(&written).ok_or("a checksum is some bytes")?;
+        let bytes = bytes(&written).ok_or("a checksum needs some bytes")?;
         Ok(Some((places[at].clone(), bytes)))
     }
 
@@ -279,7 +280,7 @@ impl Frame {
                 && let Some(is) = buffer.get(place.start..place.end.min(buffer.len()))
                 && !fixed.starts_with(is)
             {
-                return Taken::Bad(1, Garbled::new(format!("`{}` begins no frame", shown(&buffer[..1]))));
+                return Taken::Bad(1, Garbled::new(format!("`{}` does not start a frame", shown(&buffer[..1]))));
             }
         }
         if buffer.len() < begins {
@@ -327,7 +328,7 @@ impl Frame {
         });
         if let Some((form, place)) = length {
             let is = read(form, &head[place.clone()]);
-            let is = is.ok_or_else(|| Garbled::new(format!("`{}` is no length", shown(&head[place.clone()]))))?;
+            let is = is.ok_or_else(|| Garbled::new(format!("`{}` is not a length", shown(&head[place.clone()]))))?;
             let without = self.counted(layout, &self.places(way, layout, 0)).unwrap_or_default();
             let size = is as i64 - without;
             return match usize::try_from(size) {
@@ -346,7 +347,7 @@ impl Frame {
         let (before, mark) = match &layout[at + 1..] {
             [Part::Fixed(mark), ..] => (0, mark),
             [check, Part::Fixed(mark), ..] => (self.width(way, check), mark),
-            _ => return Err(Garbled::new("nothing says where a message ends")),
+            _ => return Err(Garbled::new("the end of a message is undefined")),
         };
         let Some(end) = rest.windows(mark.len()).position(|w| w == mark) else { return Ok(None) };
         let size = end.checked_sub(before);
@@ -367,7 +368,8 @@ impl Frame {
                 Part::Data => data = is.to_vec(),
                 Part::Address(_) => address = Some(is.to_vec()),
                 Part::Number(form) => {
-                    let read = read(form, is).ok_or_else(|| Garbled::new(format!("`{}` is no number", shown(is))))?;
+                    let read =
+                        read(form, is).ok_or_else(|| Garbled::new(format!("`{}` is not a number", shown(is))))?;
                     number = Some(read as u64);
                 }
             }
@@ -405,14 +407,14 @@ fn written(frames: &Frames, layout: &[Part], address: Option<&str>) -> Result<Op
     let written = match form {
         None => text.to_owned(),
         Some(form) => {
-            let number = text.parse::<f64>().map_err(|_| format!("`{text}` is no number"))?;
-            form.write(number).map_err(|why| format!("`{text}` is no address here: {why}"))?
+            let number = text.parse::<f64>().map_err(|_| format!("`{text}` is not a number"))?;
+            form.write(number).map_err(|why| format!("`{text}` is not an address here: {why}"))?
         }
     };
     bytes(&written)
         .filter(|a| (1..=LONGEST).contains(&a.len()))
         .map(Some)
-        .ok_or_else(|| "an address is some bytes".to_owned())
+        .ok_or_else(|| "an address needs some bytes".to_owned())
 }
 
 /// A number as often as its form comes round again.
@@ -442,5 +444,5 @@ fn text(data: &[u8], carries: Carries) -> Result<String, Garbled> {
     let data = data.trim_ascii();
     let good = data.iter().all(|b| (0x20..0x7f).contains(b) || *b == b'\t');
     let text = std::str::from_utf8(data).ok().filter(|_| good);
-    text.map(str::to_owned).ok_or_else(|| Garbled::new(format!("`{}` is no text", shown(data))))
+    text.map(str::to_owned).ok_or_else(|| Garbled::new(format!("`{}` is not text", shown(data))))
 }

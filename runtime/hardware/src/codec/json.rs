@@ -95,7 +95,7 @@ impl Json {
         let status = text.split(' ').next().and_then(|s| s.parse::<u16>().ok());
         Some(match (status, parts(&text)) {
             (Some(status), Some(_)) => Ok(Reply { is_error: status >= REFUSED, ..Reply::of(text) }),
-            _ => Err(Garbled::new(format!("`{}` is no answer in JSON", shortened(&text)))),
+            _ => Err(Garbled::new(format!("`{}` is not a reply in JSON", shortened(&text)))),
         })
     }
 
@@ -325,7 +325,7 @@ fn line(buffer: &mut Vec<u8>) -> Option<Result<String, Garbled>> {
     };
     let bytes: Vec<u8> = buffer.drain(..=at).collect();
     let text = String::from_utf8(bytes).map(|t| t.trim_end().to_owned());
-    Some(text.map_err(|_| Garbled::new("it is no text in UTF-8")))
+    Some(text.map_err(|_| Garbled::new("it is not text in UTF-8")))
 }
 
 /// Status and body of an answer.

@@ -49,7 +49,7 @@ pub(super) fn request(text: &str) -> Result<Vec<u8>, String> {
 
 /// The device's end: a request as drivers write it.
 pub(super) fn requested(pdu: &[u8]) -> Result<(String, Asked), Garbled> {
-    let none = || Garbled::new(format!("`{}` is no request of Modbus", shown(pdu)));
+    let none = || Garbled::new(format!("`{}` is not a request of Modbus", shown(pdu)));
     let (&[function, a, b, c, d], rest) = pdu.split_first_chunk::<5>().ok_or_else(none)?;
     let (address, number) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
     let (object, count, values) = match (function, rest) {
@@ -84,7 +84,7 @@ pub(super) fn requested(pdu: &[u8]) -> Result<(String, Asked), Garbled> {
 
 /// What an answer says: `on off`, `0x00EB`, `ok`, `exception 2`.
 pub(super) fn answered(asked: &Asked, pdu: &[u8]) -> Result<Reply, Garbled> {
-    let none = || Garbled::new(format!("`{}` is no answer to this", shown(pdu)));
+    let none = || Garbled::new(format!("`{}` is not a reply to this", shown(pdu)));
     let (function, rest) = pdu.split_first().ok_or_else(none)?;
     if *function == asked.function | EXCEPTION {
         let [code] = rest else { return Err(none()) };
@@ -143,7 +143,7 @@ pub(super) fn size_of_request(begun: &[u8]) -> Result<Option<usize>, Garbled> {
         [1..=6, ..] => Some(5),
         [15 | 16, _, _, _, _, size, ..] => Some(6 + usize::from(*size)),
         [15 | 16, ..] => None,
-        [other, ..] => return Err(Garbled::new(format!("the function {other} is not known"))),
+        [other, ..] => return Err(Garbled::new(format!("unknown function {other}"))),
     })
 }
 
@@ -155,7 +155,7 @@ pub(super) fn size_of_answer(begun: &[u8]) -> Result<Option<usize>, Garbled> {
         [1..=4, size, ..] => Some(2 + usize::from(*size)),
         [1..=4] => None,
         [5 | 6 | 15 | 16, ..] => Some(5),
-        [other, ..] => return Err(Garbled::new(format!("the function {other} is not known"))),
+        [other, ..] => return Err(Garbled::new(format!("unknown function {other}"))),
     })
 }
 

@@ -19,14 +19,14 @@ pub(super) fn alike(devices: &[Device<'_>]) -> Vec<Diagnostic> {
             let Ok(example) = example(answer) else { continue };
             let Some(said) = by_itself(of).find(|said| matched(said, &example).is_some()) else { continue };
             let headline = format!(
-                "`{}`, which `{}` expects, cannot be told from what `{}` says by itself",
+                "the reply `{}` that `{}` expects looks like a message that `{}` sends by itself",
                 written(answer),
                 driver.name,
                 of.name
             );
-            let d = Diagnostic::error(codes::DRIVER_LINE, answer.span, headline, "looks the same");
-            let d = d.because(said.span, format!("said by itself: `{}`", written(said)));
-            found.push(d.help("let the device say it in another form, or not by itself"));
+            let d = Diagnostic::error(codes::DRIVER_LINE, answer.span, headline, "ambiguous reply");
+            let d = d.because(said.span, format!("sent by itself: `{}`", written(said)));
+            found.push(d.help("let the device send it in another form, or only when asked"));
         }
     }
     found

@@ -54,14 +54,14 @@ impl Hardware<'_, '_> {
             return Ok(());
         }
         let message = format!(
-            "`{}` heard nothing for {} s, and its watchdog waits {} s: it may have stopped",
+            "`{}` received nothing for {} s, longer than its watchdog waits ({} s): it may have stopped",
             self.devices[device].name,
             show_number(alone),
             show_number(patience)
         );
         let mut fault = self.fault(codes::DIVERGED, alive.repeated.exchange.span, message);
         fault.help.push(
-            "this machine was busy or asleep, or a line was slow: see what the device does, and begin anew".to_owned(),
+            "this computer was busy or asleep, or a line was slow: check the device, then start again".to_owned(),
         );
         Err(fault)
     }

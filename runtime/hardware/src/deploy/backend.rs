@@ -161,7 +161,7 @@ impl Hardware<'_, '_> {
         out: &mut dyn Listener,
     ) -> Result<Ticket, Fault> {
         if self.refused.get() {
-            let message = format!("`{}` is not said: it was refused to go on", operation.verb);
+            let message = format!("`{}` was not sent: the deployment cannot continue", operation.verb);
             return Err(self.fault(codes::JOURNAL_MISMATCH, None::<Span>, message));
         }
         // What begins now begins where the clock is by now, on the twin too.
@@ -176,7 +176,7 @@ impl Hardware<'_, '_> {
         self.tickets += 1;
         let ticket = Ticket(number);
         let Some(device) = found.or_else(|| self.is_dry().then_some(usize::MAX)) else {
-            let message = format!("nothing carries out `{label}`");
+            let message = format!("no device carries out `{label}`");
             return Err(self.fault(codes::UNDRIVEN, program.plan.get(step).span, message));
         };
         let driver = self.devices.get(device).and_then(|d| d.driver);

@@ -22,15 +22,16 @@ impl Hardware<'_, '_> {
             let node = self.program.plan.get(id);
             let wrong = driver.call(id).into_iter().flat_map(|exchange| self.refused(exchange, link));
             found.extend(wrong.map(|why| {
-                finding(node.span, &format!("`{}` cannot be told to `{}`: {why}", node.label, device.name))
+                finding(node.span, &format!("`{}` cannot be sent to `{}`: {why}", node.label, device.name))
             }));
         }
         let asked = asked_for(self.program, &self.observed);
         for (device, driver, link) in (0..self.devices.len()).filter_map(|index| self.spoken_to(index)) {
-            let cannot = |what: &str, why: &str| format!("`{}` cannot {what} `{}`: {why}", driver.name, device.name);
+            let cannot =
+                |what: &str, why: &str| format!("the driver `{}` cannot {what} `{}`: {why}", driver.name, device.name);
             for exchange in driver.said_apart() {
                 let wrong = self.refused(exchange, link);
-                found.extend(wrong.into_iter().map(|why| finding(exchange.span, &cannot("speak to", &why))));
+                found.extend(wrong.into_iter().map(|why| finding(exchange.span, &cannot("talk to", &why))));
             }
             for told in driver.told.iter().filter(|told| asked.contains(&told.value)) {
                 let wrong = self.known(&told.asks).and_then(|text| link.judge_question(&text).err());
@@ -72,6 +73,6 @@ impl Hardware<'_, '_> {
 }
 
 fn finding(span: Span, headline: &str) -> Diagnostic {
-    Diagnostic::error(codes::UNSENDABLE, span, headline, "the device does not take this")
-        .help("nothing was said to any device")
+    Diagnostic::error(codes::UNSENDABLE, span, headline, "the device does not accept this")
+        .help("nothing was sent to any device")
 }

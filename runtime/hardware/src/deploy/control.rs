@@ -28,7 +28,7 @@ impl Answer {
     /// A no in words.
     pub(super) fn refusal(who: &str) -> String {
         match who {
-            Self::NOBODY => "nobody is there to confirm it: run it on a terminal, or with `--yes`".to_owned(),
+            Self::NOBODY => "nobody can confirm it: run it on a terminal, or with `--yes`".to_owned(),
             who => format!("{who} did not confirm it"),
         }
     }

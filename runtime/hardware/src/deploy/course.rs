@@ -130,13 +130,11 @@ pub fn carry_out(
         Kept::New(journal) => (journal, None, None),
         Kept::Left(journal, before) => {
             let unfit = match journal.is_shut() {
-                true => {
-                    Some(refused(at, "the devices of this journal were made safe when it could not be gone on with"))
-                }
+                true => Some(refused(at, "the devices of this journal were made safe when it could not be resumed")),
                 false => unfit(at, &before, &digest, (speed, seed)).or_else(|| {
                     let devices = devices.as_deref().unwrap_or_default();
                     let why = mixed_up(&places(&before), &first_said(&before), devices)?;
-                    Some(refused(at, &format!("{why}: nobody can tell which of them is which")))
+                    Some(refused(at, &format!("{why}: they cannot be distinguished")))
                 }),
             };
             let unfit = unfit.filter(|_| mode != Mode::Replay);
@@ -269,16 +267,16 @@ fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
         _ => None,
     });
     let at = telling.map(|(b, _)| b).or(bindings.first()).filter(|_| !is_measured)?.at;
-    let d = Diagnostic::error(codes::BINDING, at, "nothing is compared with the twin", "no device has a `tolerance`");
+    let d = Diagnostic::error(codes::BINDING, at, "no device is compared with the twin", "no device has a `tolerance`");
     Some(match telling {
         Some((_, told)) => {
             let member = told.name.rsplit('.').next().unwrap_or(&told.name);
             d.help(format!(
-                "say how far from the twin it may be: `tolerance = {{ {member} = \"2 {}\" }}`",
+                "give the allowed difference from the twin: `tolerance = {{ {member} = \"2 {}\" }}`",
                 told.difference.symbol
             ))
         }
-        None => d.help("no device of these tells anything: take another mode"),
+        None => d.help("none of these devices reports anything: choose another mode"),
     })
 }
 
@@ -287,29 +285,30 @@ fn unfit(at: Span, before: &[Entry], digest: &str, (speed, seed): (f64, u64)) ->
     let this = env!("CARGO_PKG_VERSION");
     match (before.first(), before.last()) {
         (_, Some(Entry::End { .. })) => {
-            let d = mismatch(at, "the deployment of this journal has come to its end");
-            Some(Unfit::Over(d.help("begin anew, with a journal of its own")))
+            let d = mismatch(at, "the deployment of this journal has already ended");
+            Some(Unfit::Over(d.help("start again with a new journal")))
         }
         (Some(Entry::Begin { version, tool, digest: of, speed: paced, seed: from, .. }), _) => match () {
-            () if *version != VERSION || tool != this => {
-                Some(refused(at, &format!("the journal was written by version {tool} of this program, not by {this}")))
-            }
-            () if of != digest => Some(refused(at, "the journal is of another program, or of other bindings")),
-            () if *paced != speed => Some(refused(at, "the journal is of a deployment at another speed")),
-            () if *from != seed => Some(refused(at, "the journal is of a deployment with another seed")),
+            () if *version != VERSION || tool != this => Some(refused(
+                at,
+                &format!("the journal was written by version {tool} of this program, but this is {this}"),
+            )),
+            () if of != digest => Some(refused(at, "the journal belongs to another program or other bindings")),
+            () if *paced != speed => Some(refused(at, "the journal belongs to a deployment at another speed")),
+            () if *from != seed => Some(refused(at, "the journal belongs to a deployment with another seed")),
             () => None,
         },
-        _ => Some(refused(at, "the journal says nothing of a deployment")),
+        _ => Some(refused(at, "the journal contains no deployment")),
     }
 }
 
 fn mismatch(at: Span, headline: &str) -> Diagnostic {
-    Diagnostic::error(codes::JOURNAL_MISMATCH, at, headline, "cannot go on")
+    Diagnostic::error(codes::JOURNAL_MISMATCH, at, headline, "cannot be resumed")
 }
 
 /// That a journal is not gone on with, though what it is about may still be on.
 fn refused(at: Span, why: &str) -> Unfit {
-    Unfit::Unknown(mismatch(at, why).help("see what the devices have done, and begin anew with a journal of its own"))
+    Unfit::Unknown(mismatch(at, why).help("check what the devices did, then start again with a new journal"))
 }
 
 /// What an earlier process has left on is made safe, as it is not known what that was.
@@ -327,7 +326,7 @@ fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
 /// Why a journal is not gone on with, and which devices were made safe.
 fn meanwhile(why: Diagnostic, hardware: &Hardware<'_, '_>) -> Diagnostic {
     let names = hardware.secured().join(", ");
-    if names.is_empty() { why } else { why.help(format!("made safe meanwhile: {names}")) }
+    if names.is_empty() { why } else { why.help(format!("these devices were made safe: {names}")) }
 }
 
 /// A fault as a finding.
@@ -340,16 +339,16 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let Unreached { device, at, trouble } = unreached;
     let what = match trouble {
         DeviceError::Lost(_) | DeviceError::Silent(_) => "cannot be reached",
-        DeviceError::Unsaid(_) => "cannot be spoken to",
+        DeviceError::Unsaid(_) => "cannot be addressed",
         DeviceError::Mistaken(_) => "is another device",
-        DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is not what it is bound as",
+        DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is another kind of device than bound",
     };
     let headline = format!("`{device}` {what}: {}", trouble.text());
     let d = Diagnostic::error(trouble.code(), *at, headline, "bound here");
     d.help(if goes_on {
-        "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"
+        "nothing was sent to any device; resume the journal with `--resume` when the device is back"
     } else {
-        "nothing was said to any device"
+        "nothing was sent to any device"
     })
 }
 
@@ -366,13 +365,13 @@ pub fn not_opened(plan: &Plan, (fault, at): (Fault, Option<Span>)) -> Diagnostic
 fn unbroken<T>(act: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(act)).map_err(|panic| {
         let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-        text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it does not say why".to_owned())
+        text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason is given".to_owned())
     })
 }
 
 fn broken(at: Span, why: &str) -> Diagnostic {
-    let headline = format!("this program broke down: {why}");
-    Diagnostic::error(codes::RUN_FAILED, at, headline, "an error in matterixc, not in the workflow")
+    let headline = format!("this program failed: {why}");
+    Diagnostic::error(codes::RUN_FAILED, at, headline, "a bug in matterixc, not in the workflow")
 }
 
 /// Makes devices safe; what could not be.
@@ -389,7 +388,7 @@ fn secured(hardware: &mut Hardware<'_, '_>, exposed: &Exposed) -> Vec<Diagnostic
 
 /// That a device did not break off what it did, whatever made it safe afterwards.
 fn not_halted((at, why): (Span, String)) -> Diagnostic {
-    let headline = format!("a device did not stop when it was told to: {why}");
+    let headline = format!("a device did not stop on command: {why}");
     Diagnostic::error(codes::DEVICE_REFUSED, at, headline, "bound here")
 }
 
@@ -399,15 +398,15 @@ fn held_up(at: Span, times: &[(f64, f64)]) -> Option<Diagnostic> {
     let more = if times.len() > 1 { format!(", the longest of {} times", times.len()) } else { String::new() };
     let (from, longest) = (show_number(from), show_number((longest * 10.0).round() / 10.0));
     let headline =
-        format!("this program stood still for {longest} s at {from} s of lab time{more}: what was due then was late");
-    let d = Diagnostic::error(codes::DIVERGED, at, headline, "not as long as it says");
-    Some(d.help("it was stopped, or this machine was asleep or busy: the journal says what was done when"))
+        format!("this program was paused for {longest} s at {from} s of lab time{more}: steps due then were late");
+    let d = Diagnostic::error(codes::DIVERGED, at, headline, "a step took longer than planned");
+    Some(d.help("it was stopped, or this computer was asleep or busy: the journal lists the times"))
 }
 
 /// That a device may be hot or moving: where it is bound, and why.
 pub fn unsafe_left((at, why): (Span, String)) -> Diagnostic {
     let headline = format!("a device could not be made safe: {why}");
-    Diagnostic::error(codes::DEVICE_LOST, at, headline, "see to it").help("go and look at it now")
+    Diagnostic::error(codes::DEVICE_LOST, at, headline, "may be hot or moving").help("go and check it now")
 }
 
 fn findings(execution: &Execution) -> Vec<Diagnostic> {
@@ -429,6 +428,6 @@ mod tests {
     fn what_breaks_down_says_why_and_takes_nothing_with_it() {
         assert_eq!(unbroken(|| 7), Ok(7));
         assert_eq!(unbroken(|| -> u8 { panic!("index {} of {}", 3, 2) }), Err("index 3 of 2".to_owned()));
-        assert_eq!(unbroken(|| -> u8 { std::panic::panic_any(1.5) }), Err("it does not say why".to_owned()));
+        assert_eq!(unbroken(|| -> u8 { std::panic::panic_any(1.5) }), Err("no reason is given".to_owned()));
     }
 }

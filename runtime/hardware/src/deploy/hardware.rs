@@ -310,7 +310,7 @@ impl<'m, 't> Hardware<'m, 't> {
     pub(super) fn unkept(&self, why: String) -> Fault {
         let fault = self.fault(codes::JOURNAL_MISMATCH, None::<Span>, why);
         fault.help(
-            "what was not written down cannot be gone on with: make room, and begin anew with a journal of its own",
+            "steps missing in the journal cannot be resumed: free disk space, then start again with a new journal",
         )
     }
 

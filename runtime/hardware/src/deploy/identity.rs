@@ -78,13 +78,13 @@ impl Hardware<'_, '_> {
         let of = &self.devices[device];
         let is = joined(said.iter().map(|(_, text)| text.as_str()));
         if let Some(bound) = of.binding.identity.as_ref().filter(|bound| **bound != is) {
-            return Err(DeviceError::Mistaken(format!("it says that it is `{is}`, and `{bound}` is bound here")));
+            return Err(DeviceError::Mistaken(format!("it identifies as `{is}`, but `{bound}` is bound here")));
         }
         let before = |word: &String| self.said_first.get(&(of.name.to_owned(), word.clone())).map(String::as_str);
         let earlier: Option<Vec<&str>> = said.iter().map(|(word, _)| before(word)).collect();
         match earlier.map(|texts| joined(texts.into_iter())) {
             Some(was) if was != is => {
-                Err(DeviceError::Mistaken(format!("it says that it is `{is}`, and `{was}` was there before")))
+                Err(DeviceError::Mistaken(format!("it identifies as `{is}`, but `{was}` was there before")))
             }
             _ => Ok(()),
         }

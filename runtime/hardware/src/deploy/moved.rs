@@ -40,14 +40,14 @@ pub(super) fn mixed_up(before: &BTreeMap<String, String>, said: &Words, devices:
         let here: BTreeSet<&str> = before.iter().filter(|(_, at)| **at == now).map(|(name, _)| name.as_str()).collect();
         if let Some(other) = here.into_iter().find(|name| *name != device.name) {
             let name = device.name;
-            return Some(format!("`{name}` is bound to `{now}` now, where `{other}` was when the journal was left"));
+            return Some(format!("`{name}` is now bound to `{now}`, where `{other}` was when the journal stopped"));
         }
         let driver = device.driver.map_or("", |driver| driver.name.as_str());
         left.entry(driver).or_default().entry(then).or_insert(device.name);
     }
     let several = left.into_values().find(|places| places.len() > 1)?;
     let names = several.values().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
-    Some(format!("{names} are alike and were all moved since the journal was left"))
+    Some(format!("{names} look alike and were all moved since the journal stopped"))
 }
 
 /// Whether a device said who it is, and no other one said the same.

@@ -116,15 +116,15 @@ fn not_bound(program: &Program, key: InstanceId, mut at: Vec<(Span, &str)>, code
     at.dedup_by_key(|(span, _)| *span);
     let (span, text) = at.first().copied().unwrap_or_default();
     let (what, who) = match code == codes::UNDRIVEN {
-        true => (format!("nothing carries out `{text}`"), "nobody is told"),
-        false => (format!("no device tells what `{text}` depends on"), "nobody is asked"),
+        true => (format!("no device carries out `{text}`"), "no device receives"),
+        false => (format!("no device reports the values in `{text}`"), "no device is asked for"),
     };
     let label = match at.len() {
-        0 | 1 => who.to_owned(),
-        2 => format!("{who} this, nor at another place"),
-        n => format!("{who} this, nor at {} other places", n - 1),
+        0 | 1 => format!("{who} this"),
+        2 => format!("{who} this; the same at another place"),
+        n => format!("{who} this; the same at {} other places", n - 1),
     };
-    let headline = format!("{what}: the bindings do not say where `{name}` is");
+    let headline = format!("{what}: `{name}` has no binding");
     Diagnostic::error(code, span, headline, label).help(lines(program, key))
 }
 
@@ -134,22 +134,22 @@ fn undriven(program: &Program, span: Span, label: &str, operation: &Operation, d
     let headline = match (name, bound.and_then(|d| d.driver)) {
         (Some(name), Some(driver)) => {
             format!(
-                "`{label}` cannot be told to `{name}`: the driver `{}` has no line for `{}`",
+                "`{name}` cannot carry out `{label}`: its driver `{}` has no line for `{}`",
                 driver.name, operation.verb
             )
         }
-        (Some(name), None) => format!("nothing carries out `{label}`: `{name}` is bound to no line"),
-        (None, _) => format!("nothing carries out `{label}`"),
+        (Some(name), None) => format!("no device carries out `{label}`: `{name}` has no line"),
+        (None, _) => format!("no device carries out `{label}`"),
     };
-    let d = Diagnostic::error(codes::UNDRIVEN, span, headline, "nobody is told");
+    let d = Diagnostic::error(codes::UNDRIVEN, span, headline, "no device receives this");
     d.help("add a line to its driver, or let a person do it: `by = \"hand\"` in the bindings")
 }
 
 fn unobserved(is_partly_told: bool, span: Span, text: &str) -> Diagnostic {
-    let headline = format!("no device tells what `{text}` depends on");
-    let mut d = Diagnostic::error(codes::UNOBSERVED, span, headline, "only the model knows it");
+    let headline = format!("no device reports the values in `{text}`");
+    let mut d = Diagnostic::error(codes::UNOBSERVED, span, headline, "only the model has these values");
     if is_partly_told {
-        d = d.help("a part of it is told, but not all");
+        d = d.help("devices report only some of these values");
     }
-    d.help("wait for something that a device tells (a `reading` line of its driver), or for a time")
+    d.help("wait for a value that a device reports (a `reading` line of its driver), or for a fixed time")
 }

@@ -23,7 +23,7 @@ impl Hardware<'_, '_> {
             return Ok(());
         }
         let Some(line) = driver.told.iter().position(|told| self.applies(told)) else {
-            let why = "nothing that it answers says that it heard what makes it safe".to_owned();
+            let why = "none of its replies confirms the `safe` command".to_owned();
             return Err(DeviceError::Silent(why));
         };
         match self.tell_once(index, line, &driver.told[line]) {
@@ -51,7 +51,7 @@ impl Hardware<'_, '_> {
                     Ok(None | Some(true)) => break,
                     Ok(Some(false)) => {
                         let how = end.condition.failure().replace('_', " ");
-                        let text = format!("it took what makes it safe, and still is {how} by what it tells");
+                        let text = format!("it accepted the `safe` command, but still reports that it is {how}");
                         DeviceError::Refused { failure: end.condition.failure().to_owned(), text }
                     }
                     Err(trouble @ (DeviceError::Refused { .. } | DeviceError::Garbled(_))) => trouble,

@@ -80,9 +80,9 @@ impl Hardware<'_, '_> {
     pub(super) fn mismatch(&self, now: &str, before: &Entry) -> Fault {
         self.refused.set(true);
         let before = serde_json::to_string(before).unwrap_or_default();
-        let message = format!("the journal does not fit the plan: {now}, but it says `{before}`");
+        let message = format!("the journal does not fit the plan: {now}, but the journal has `{before}`");
         let mut fault = self.fault(codes::JOURNAL_MISMATCH, None::<Span>, message);
-        fault.help.push("begin anew, with a journal of its own".to_owned());
+        fault.help.push("start again with a new journal".to_owned());
         fault
     }
 
@@ -130,7 +130,7 @@ impl Hardware<'_, '_> {
                 }
                 other => {
                     let now = show_number(self.twin.now());
-                    return Err(self.mismatch(&format!("`{label}` begins at {now} s"), &other));
+                    return Err(self.mismatch(&format!("`{label}` starts at {now} s"), &other));
                 }
             }
         }
@@ -146,12 +146,12 @@ impl Hardware<'_, '_> {
         }
         self.refused.set(true);
         let message = format!(
-            "it is not known whether its device was told `{}` for `{}` before the journal broke off",
+            "it is unknown whether `{}` was sent for `{}` before the journal stopped",
             sends.join("`, `"),
             planned.label
         );
         let mut fault = self.fault(codes::JOURNAL_MISMATCH, planned.span, message);
-        fault.help.push("it may have moved something: look, and begin anew from there".to_owned());
+        fault.help.push("the device may have acted: check it, then start again from there".to_owned());
         Err(fault)
     }
 

@@ -106,11 +106,11 @@ impl Hardware<'_, '_> {
         let back = self.left_at.1 - self.wall();
         if back > SET_BACK {
             let message = format!(
-                "the clock of this machine is {} s before the last line of the journal: nobody knows how long devices were alone",
+                "the clock of this computer is {} s before the last line of the journal: the time without contact to the devices is unknown",
                 show_number(back)
             );
             let mut fault = self.fault(codes::JOURNAL_MISMATCH, None::<matterix_ir::Span>, message);
-            fault.help.push("set the clock, or begin anew".to_owned());
+            fault.help.push("set the clock, or start again with a new journal".to_owned());
             return Err(fault);
         }
         let watchdogs = self.watchdogs();
@@ -141,13 +141,13 @@ impl Hardware<'_, '_> {
         let (device, span) =
             (&self.devices[*device], self.devices[*device].driver.map_or_else(Default::default, |d| d.span));
         let message = format!(
-            "`{}` has heard nothing for {} s, and its watchdog waits {} s: it may have stopped",
+            "`{}` has received nothing for {} s, longer than its watchdog waits ({} s): it may have stopped",
             device.name,
             show_number(away + patience - left),
             show_number(*patience)
         );
         let mut fault = self.fault(codes::JOURNAL_MISMATCH, span, message);
-        fault.help.push("see what the device does, and begin anew".to_owned());
+        fault.help.push("check the device, then start again with a new journal".to_owned());
         Err(fault)
     }
 

@@ -130,7 +130,7 @@ impl Hardware<'_, '_> {
         let left: Vec<String> = left.map(|end| end.condition.failure().replace('_', " ")).collect();
         let undone = self.devices[index].undone.join("`, `");
         match (left.is_empty(), undone.is_empty()) {
-            (_, false) => Some(format!("it was set by hand, and nobody confirmed `{undone}`")),
+            (_, false) => Some(format!("it was set by hand, but nobody confirmed `{undone}`")),
             (false, true) => Some(format!("it was set by hand and is {}", left.join(", "))),
             (true, true) => None,
         }
@@ -168,7 +168,7 @@ impl Hardware<'_, '_> {
             if !driver.stays_on || !self.devices[index].told || !self.speaks() {
                 return Ok(());
             }
-            let why = "its driver has no line `safe`";
+            let why = "its driver has no `safe` line";
             let (t, device, trouble) = (self.twin.now(), name.to_owned(), Some(why.to_owned()));
             self.note_safe(Entry::Safe { t, device, trouble });
             return Err(named(why, name));
@@ -305,7 +305,7 @@ impl Hardware<'_, '_> {
             let passed = self.settings.world.elapsed().saturating_sub(begun);
             if passed >= timeout.min(SECURED) {
                 let seconds = timeout.min(SECURED).as_secs_f64();
-                return Err(DeviceError::Silent(format!("it did not tell within {seconds} s that it was safe")));
+                return Err(DeviceError::Silent(format!("it did not report within {seconds} s that it is safe")));
             }
             self.settings.world.sleep(POLL);
         }

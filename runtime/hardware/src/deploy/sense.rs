@@ -64,7 +64,10 @@ impl Hardware<'_, '_> {
                 return Ok(());
             }
             if self.settings.control.is_stopped() {
-                let message = format!("`{}` was not waited for: it was stopped by a person", self.devices[index].name);
+                let message = format!(
+                    "the wait for `{}` was cancelled: a person stopped the deployment",
+                    self.devices[index].name
+                );
                 return Err(self.fault(codes::RUN_FAILED, exchange.span, message));
             }
             self.settings.world.sleep(std::time::Duration::from_millis(100));
@@ -156,7 +159,7 @@ impl Hardware<'_, '_> {
             return Ok(());
         }
         let (name, is, was) = (&told.name, told.show(value), told.show(wanted));
-        let message = format!("`{name}` is {is} on the device, not {was} as it was told");
+        let message = format!("`{name}` is {is} on the device, but it was set to {was}");
         let span = told.span;
         Err(self.fault(codes::DIVERGED, span, message))
     }
@@ -191,10 +194,10 @@ impl Hardware<'_, '_> {
             Some(tolerance) if (value - supposed).abs() > tolerance => {
                 let (name, is, twin) = (&told.name, told.unit.show(value), told.unit.show(supposed));
                 let apart = matterix_ir::quantity::show_number((value - supposed).abs() / told.unit.factor.abs());
-                let message = format!("`{name}` is {is}, {apart} from the {twin} of the twin");
+                let message = format!("`{name}` is {is}, but {twin} on the twin: they differ by {apart}");
                 let span = told.span;
                 let mut fault = self.fault(codes::DIVERGED, span, message);
-                fault.help.push("the device or the model is not what it was taken for".to_owned());
+                fault.help.push("check the device, its calibration and the model".to_owned());
                 Err(fault)
             }
             _ => Ok(()),

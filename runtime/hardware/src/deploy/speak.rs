@@ -56,7 +56,7 @@ impl<'m> Hardware<'m, '_> {
         }
         self.renew(self.line_of(index));
         if let Some(why) = &self.devices[self.line_of(index)].lost {
-            return Err(DeviceError::Lost(format!("nothing more can be said to it: {why}")));
+            return Err(DeviceError::Lost(format!("nothing more can be sent to it: {why}")));
         }
         let device = &mut self.devices[index];
         if is_dry {
@@ -197,7 +197,7 @@ impl<'m> Hardware<'m, '_> {
     pub(super) fn tell(&mut self, index: usize, line: usize) -> Result<f64, Fault> {
         let Some(told) = self.devices[index].driver.and_then(|d| d.told.get(line)) else { return Ok(f64::NAN) };
         if !self.applies(told) {
-            let message = format!("`{}` cannot be told now: its driver says so", told.name);
+            let message = format!("`{}` cannot be sent now: a condition of its driver is false", told.name);
             return Err(self.fault(codes::DEVICE_REFUSED, told.span, message));
         }
         let text = self.texts(std::slice::from_ref(&told.asks))?.concat();

@@ -61,7 +61,7 @@ pub(super) fn lines(program: &Program, key: InstanceId) -> String {
         several => several.iter().map(|d| format!("{}\n  driver = \"{}\"", line(d), d.name)).collect(),
     };
     let ways: Vec<String> = ways.iter().map(|way| format!("\n  [{}]\n  {way}", toml_key(name))).collect();
-    format!("write in the bindings{}", ways.join("\nor"))
+    format!("add to the bindings{}", ways.join("\nor"))
 }
 
 /// A name as a key of TOML.

@@ -30,7 +30,7 @@ impl Hardware<'_, '_> {
                 self.replay.pop_front();
                 value
             }
-            Some(other) => return Err(self.mismatch(&format!("`{name}` is asked for"), &other)),
+            Some(other) => return Err(self.mismatch(&format!("the workflow needs `{name}`"), &other)),
             None => {
                 self.go_live(out)?;
                 let now = self.twin.now();

@@ -43,7 +43,7 @@ pub(super) struct Unit<'m> {
 impl<'m> Unit<'m> {
     /// The device of the first of these drivers; the others speak over its line.
     pub(super) fn new(drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
-        let first = drivers.first().ok_or("no driver says how it is spoken to")?;
+        let first = drivers.first().ok_or("it has no driver")?;
         let codec = Codec::new(&first.framing, address.or(first.address.as_deref()))?;
         let told = drivers.iter().flat_map(|d| &d.told).filter_map(|t| t.heard.map(|every| (t, every)));
         let (due, running, heard) = (told.collect(), Vec::new(), BTreeMap::new());
@@ -199,7 +199,7 @@ impl<'m> Device<'_, 'm> {
                 return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p.of(place)))));
             }
         }
-        Ok(self.refuse(NOT_UNDERSTOOD, &format!("the driver says nothing like `{}`", cut(word))))
+        Ok(self.refuse(NOT_UNDERSTOOD, &format!("the driver has no line like `{}`", cut(word))))
     }
 
     /// An answer without numbers of its own.
@@ -312,11 +312,11 @@ impl<'m> Device<'_, 'm> {
             return self.begin(served, &all, word).map(Some);
         }
         let Some((served, need)) = unmet.and_then(|(s, at)| Some((s, s.operation.needs.get(at)?))) else {
-            return Ok(Some(self.refuse(NOT_UNDERSTOOD, &format!("nothing here is meant by `{}`", cut(word)))));
+            return Ok(Some(self.refuse(NOT_UNDERSTOOD, &format!("`{}` is unknown here", cut(word)))));
         };
         self.refused.push(refusal(word, &served.operation.verb, need));
         let failure = need.refusal.as_ref().map_or(NOT_UNDERSTOOD, |r| r.failure.as_str());
-        Ok(Some(self.refuse(failure, &format!("`{}` does not hold", need.text))))
+        Ok(Some(self.refuse(failure, &format!("`{}` is false", need.text))))
     }
 
     fn begin(&mut self, served: &'m Served, found: &[Found], word: &str) -> Result<Option<Reply>, Fault> {
@@ -377,7 +377,7 @@ fn cut(word: &str) -> &str {
 fn refusal(word: &str, verb: &str, need: &Condition) -> String {
     let help = need.refusal.as_ref().and_then(|r| r.help.as_ref()).map_or(String::new(), |help| format!(": {help}"));
     let failure = need.failure().replace('_', " ");
-    format!("`{}`, `{verb}`, is refused, {failure}{help} (`{}` does not hold)", cut(word), need.text)
+    format!("`{}`, `{verb}`, is refused: {failure}{help} (`{}` is false)", cut(word), need.text)
 }
 
 /// What is said apart from commands, and whether it breaks off what the device does.

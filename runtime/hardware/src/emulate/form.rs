@@ -9,11 +9,11 @@ pub(super) fn field(kind: &str, bytes: &[u8]) -> Result<String, String> {
     let mark = mark.map(|m| m.trim_matches('"')).filter(|m| !m.is_empty()).ok_or("the form has no boundary")?;
     let begins = format!("--{mark}\r\n");
     let ends = format!("\r\n--{mark}--");
-    let rest = bytes.strip_prefix(begins.as_bytes()).ok_or("the form does not begin with its boundary")?;
+    let rest = bytes.strip_prefix(begins.as_bytes()).ok_or("the form does not start with its boundary")?;
     let at = rest.windows(4).position(|w| w == b"\r\n\r\n").ok_or("the form has no file")?;
-    let head = std::str::from_utf8(&rest[..at]).map_err(|_| "the head of the form is no text")?;
+    let head = std::str::from_utf8(&rest[..at]).map_err(|_| "the head of the form is not text")?;
     let file = &rest[at + 4..];
-    let end = file.windows(ends.len()).rposition(|w| w == ends.as_bytes()).ok_or("the form breaks off")?;
+    let end = file.windows(ends.len()).rposition(|w| w == ends.as_bytes()).ok_or("the form is incomplete")?;
     let named = |name: &str| head.split([';', '\r', '\n']).find_map(|p| p.trim().strip_prefix(name)?.strip_suffix('"'));
     let (Some(field), Some(name)) = (named("name=\""), named("filename=\"")) else {
         return Err("the form has no file with a name".to_owned());

@@ -17,11 +17,11 @@ pub fn serve_http(
     ready: &mut dyn FnMut(&str),
 ) -> Result<(), String> {
     let limits = Limits { body: LONGEST_JSON, ..Limits::default() };
-    let mut server = Server::bind(port, limits).map_err(|e| format!("cannot listen at port {port}: {e}"))?;
+    let mut server = Server::bind(port, limits).map_err(|e| format!("cannot listen on port {port}: {e}"))?;
     ready(&server.address().to_string());
     let clock = Clock::new(stop.speed);
     while !stop.cancel.load(Ordering::Relaxed) {
-        let Some(asked) = server.next(TICK).map_err(|e| format!("the port is gone: {e}"))? else {
+        let Some(asked) = server.next(TICK).map_err(|e| format!("the port was lost: {e}"))? else {
             turn(emulator, &clock, &[])?;
             continue;
         };

@@ -33,9 +33,9 @@ pub fn serve_pty(
     ready(made.as_ref().and_then(Symlink::name).unwrap_or(&name));
     let clock = Clock::new(stop.speed);
     while !stop.cancel.load(Ordering::Relaxed) {
-        let came = line.next(TICK).map_err(|e| format!("the pseudo-terminal is gone: {e}"))?;
+        let came = line.next(TICK).map_err(|e| format!("the pseudo-terminal was lost: {e}"))?;
         let out = turn(emulator, &clock, &came)?;
-        line.send(&out).map_err(|e| format!("the pseudo-terminal is gone: {e}"))?;
+        line.send(&out).map_err(|e| format!("the pseudo-terminal was lost: {e}"))?;
     }
     Ok(())
 }

@@ -41,7 +41,7 @@ impl Drop for Symlink {
 /// Takes the place of another link in one step.
 fn replace(path: &Path, target: &str) -> io::Result<()> {
     if !fs::symlink_metadata(path)?.is_symlink() {
-        return Err(io::Error::other("what is there is no symbolic link, and is left as it is"));
+        return Err(io::Error::other("another file exists there and stays unchanged"));
     }
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let beside = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
@@ -67,7 +67,7 @@ mod tests {
         fs::create_dir(&inner).expect("a folder");
         symlink("/nowhere", &path).expect("a link");
         for taken in [&file, &inner] {
-            assert!(Symlink::new(taken, "/dev/null").expect_err("refused").contains("is no symbolic link"));
+            assert!(Symlink::new(taken, "/dev/null").expect_err("refused").contains("another file exists there"));
         }
         assert_eq!(fs::read_to_string(&file).expect("still there"), "kept");
 

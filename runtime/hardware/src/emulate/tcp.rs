@@ -16,12 +16,12 @@ pub fn serve_tcp(
     stop: Stop<'_>,
     ready: &mut dyn FnMut(&str),
 ) -> Result<(), String> {
-    let mut server = Server::bind(port, Limits::default()).map_err(|e| format!("cannot listen at port {port}: {e}"))?;
+    let mut server = Server::bind(port, Limits::default()).map_err(|e| format!("cannot listen on port {port}: {e}"))?;
     ready(&server.address().to_string());
     let clock = Clock::new(stop.speed);
     let mut unfinished = BTreeMap::new();
     while !stop.cancel.load(Ordering::Relaxed) {
-        match server.next(TICK).map_err(|e| format!("the port is gone: {e}"))? {
+        match server.next(TICK).map_err(|e| format!("the port was lost: {e}"))? {
             Some(Heard::Said(client, bytes)) => {
                 // What devices say by themselves is for all.
                 server.publish(&turn(emulator, &clock, &[])?);

@@ -80,7 +80,7 @@ impl<'p> Desk<'p> {
     /// Answers what was asked for.
     pub(super) fn answer(&self, read: Read, kind: &Kind, number: Option<f64>) {
         let value = number.and_then(|n| values::value(self.scene, kind, n));
-        let value = value.ok_or_else(|| Failure::Garbled("it is not known now".to_owned()));
+        let value = value.ok_or_else(|| Failure::Garbled("its value is unknown now".to_owned()));
         // Who has gone needs no answer.
         let _ = read.answer.send(value);
     }
@@ -146,7 +146,7 @@ impl<'p> Desk<'p> {
         let number = self.returned.borrow_mut().remove(&local);
         match number.and_then(|n| values::value(self.scene, kind, n)) {
             Some(value) => News::Done(vec![value]),
-            None => News::Failed(Failure::Garbled("it ended without a result that is known".to_owned())),
+            None => News::Failed(Failure::Garbled("it ended without a known result".to_owned())),
         }
     }
 
@@ -188,14 +188,13 @@ impl<'p> Desk<'p> {
             let _ = call.news.send(News::NotNow(why));
         };
         let Some(offer) = self.catalogue.commands.get(call.feature).and_then(|c| c.get(call.command)).copied() else {
-            not_now(&call, "there is no such command".to_owned());
+            not_now(&call, "unknown command".to_owned());
             return None;
         };
         let Some((arranged, locals)) = self.arranged(offer, &call) else {
-            let _ = call.news.send(News::Failed(Failure::Garbled(format!(
-                "`{}` cannot be done with these things here",
-                offer.verb
-            ))));
+            let _ = call
+                .news
+                .send(News::Failed(Failure::Garbled(format!("`{}` is not possible with these things", offer.verb))));
             return None;
         };
         let mut mine = self.claims(arranged.step);
@@ -205,12 +204,12 @@ impl<'p> Desk<'p> {
             taken.map(|instance| (instance, *step))
         });
         if self.going.borrow().contains_key(&arranged.step) {
-            not_now(&call, format!("`{}` goes on already", self.plan.get(arranged.step).label));
+            not_now(&call, format!("`{}` is already running", self.plan.get(arranged.step).label));
             return None;
         }
         if let Some((instance, by)) = busy {
             let (name, label) = (&self.scene.get(instance).name, &self.plan.get(by).label);
-            not_now(&call, format!("`{name}` is in use: `{label}` goes on"));
+            not_now(&call, format!("`{name}` is in use: `{label}` is running"));
             return None;
         }
         let going = Going {
@@ -294,7 +293,7 @@ impl Listener for Attendant<'_, '_> {
             let going = self.desk.going.borrow();
             let user = going.get(&asked.step).and_then(|g| g.call.user.as_ref());
             let by = user.map_or_else(String::new, |user| format!(", called by {user}"));
-            (self.say)(&format!("{time:10.3} s  {} begins{by}\n", self.desk.plan.get(asked.step).label));
+            (self.say)(&format!("{time:10.3} s  {} starts{by}\n", self.desk.plan.get(asked.step).label));
         }
         asked.into_iter().collect()
     }
@@ -320,12 +319,12 @@ impl Listener for Attendant<'_, '_> {
             (_, StepState::Done) => self.desk.done(&going),
             (Some(failure), _) => self.desk.failed(&going.call, failure),
             (None, _) if going.call.is_cancelled() => News::Failed(Failure::Garbled("it was cancelled".to_owned())),
-            (None, _) => News::Failed(Failure::Garbled("it was broken off".to_owned())),
+            (None, _) => News::Failed(Failure::Garbled("it was stopped".to_owned())),
         };
         let how = match &news {
             News::Done(_) => "is done".to_owned(),
             News::Failed(Failure::Garbled(text)) if state == StepState::Done => format!("fails: {text}"),
-            _ => format!("fails: {}", going.failure.as_ref().map_or("broken off", |(_, text)| text.as_str())),
+            _ => format!("fails: {}", going.failure.as_ref().map_or("stopped", |(_, text)| text.as_str())),
         };
         (self.say)(&format!("{time:10.3} s  {label} {how}\n"));
         let _ = going.call.news.send(news);

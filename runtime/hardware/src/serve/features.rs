@@ -64,19 +64,16 @@ pub fn catalogue<'p>(
             None => (
                 format!("{} skills", scene.lab),
                 "Skills".to_owned(),
-                format!("The skills of the lab `{}`, each with several of its things.", scene.lab),
+                format!("Skills of the lab `{}` that use several of its things.", scene.lab),
             ),
         };
         let called = identifier(&name);
         if called.len() > LONGEST {
-            return Err(format!(
-                "`{display}` would be offered under a name of {} letters; {LONGEST} are allowed",
-                called.len()
-            ));
+            return Err(format!("the name of `{display}` would have {} letters; {LONGEST} are allowed", called.len()));
         }
         if let Some(other) = out.features.iter().find(|f| f.identifier.eq_ignore_ascii_case(&called)) {
             return Err(format!(
-                "`{}` and `{display}` would both be offered as `{called}`: give one of the things another name",
+                "`{}` and `{display}` would both have the name `{called}`: rename one of the things",
                 other.display
             ));
         }
@@ -189,10 +186,10 @@ pub(super) fn error_name(failure: &str) -> String {
 fn defined(failure: &Failure) -> Named {
     let identifier = error_name(&failure.name);
     let what = match failure.name.as_str() {
-        NEED => "What the command needs does not hold.".to_owned(),
+        NEED => "A need of the command is not met.".to_owned(),
         other => format!("The failure `{other}`."),
     };
-    let help = failure.help.as_ref().map_or(String::new(), |help| format!("To mend it: {help}."));
+    let help = failure.help.as_ref().map_or(String::new(), |help| format!("To fix it: {help}."));
     Named { display: spaced(&identifier), identifier, description: joined(&[&what, &help]) }
 }
 

@@ -12,7 +12,7 @@ pub use desk::{Attendant, Desk};
 pub use features::{Catalogue, catalogue};
 pub use paced::Paced;
 
-/// Makes the plan of a lab wait for what is asked of it, without end.
+/// Makes the plan of a lab wait for the next command of it, without end.
 pub fn wait_for_ever(program: &mut Program) {
     let node = program.model.graph.number(0.0);
     let span = program.scene.instances.first().map(|first| first.span).unwrap_or_default();
@@ -21,5 +21,5 @@ pub fn wait_for_ever(program: &mut Program) {
         Condition { node, text, span, compared: Vec::new(), terms: Vec::new(), refusal: None, each: Vec::new() };
     let step = Step::WaitUntil { condition, timeout: None };
     program.plan.root = StepId(program.plan.steps.len() as u32);
-    program.plan.steps.push(PlanStep { label: "wait for what is asked".to_owned(), span, step });
+    program.plan.steps.push(PlanStep { label: "wait for the next command".to_owned(), span, step });
 }

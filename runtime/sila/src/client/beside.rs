@@ -66,7 +66,7 @@ impl Beside {
 impl Client {
     /// Logs in: from here on calls say who makes them.
     pub(super) fn log_in(&mut self, login: &Login) -> Result<(), Failure> {
-        let missing = || Failure::Garbled("it knows no users: leave out `user`".to_owned());
+        let missing = || Failure::Garbled("it has no users: remove `user`".to_owned());
         let feature = self.standard(LOGIN).ok_or_else(missing)?;
         let service = self.standard(SERVICE).unwrap_or_default();
         let uuid = self.read(service, "ServerUUID")?;
@@ -80,7 +80,7 @@ impl Client {
 
     /// Takes the server for oneself, also where one has done so before.
     pub(super) fn take(&mut self, lock: &Lock) -> Result<(), Failure> {
-        let missing = || Failure::Garbled("it cannot be locked: leave out `lock`".to_owned());
+        let missing = || Failure::Garbled("it cannot be locked: remove `lock`".to_owned());
         let feature = self.standard(LOCK).ok_or_else(missing)?;
         let seconds = i64::try_from(lock.lapse.as_secs().max(1)).unwrap_or(i64::MAX);
         let arguments = [Value::Text(lock.name.clone()), Value::Integer(seconds)];
@@ -129,10 +129,8 @@ impl Client {
                     continue;
                 }
                 let how = match own && id.contains(ACCESS) {
-                    true => "it asks who calls: say `user` and `password_env`".to_owned(),
-                    false => format!(
-                        "its calls need the metadata `{name}` of `{id}` beside them, which cannot be given here"
-                    ),
+                    true => "it needs a login: add `user` and `password_env`".to_owned(),
+                    false => format!("its calls need the metadata `{name}` of `{id}`, which is not supported"),
                 };
                 return Err(Failure::Garbled(how));
             }
@@ -167,7 +165,7 @@ impl Client {
         let Some((index, property)) = asked else {
             self.lapse = None;
             let why = format!(
-                "`{main}` has nothing that can be asked for to keep the lock: give `lock` a longer time than the run takes"
+                "`{main}` has no property that keeps the lock alive: give `lock` a longer time than the run takes"
             );
             return Err(Failure::Garbled(why));
         };
@@ -175,7 +173,7 @@ impl Client {
             // Who is told no has been heard.
             Ok(_) | Err(Failure::Garbled(_)) => Ok(()),
             Err(Failure::Refused { name, message }) if name.contains("Lock") || name == "InvalidMetadata" => {
-                Err(Failure::Lost(format!("the lock is gone: it answered `{name}`: {message}")))
+                Err(Failure::Lost(format!("the lock was lost: it replied `{name}`: {message}")))
             }
             Err(Failure::Refused { .. }) => Ok(()),
             Err(lost) => Err(lost),
@@ -189,7 +187,7 @@ impl Client {
 
     /// From here on a text goes beside all calls that the server says it belongs to.
     fn beside(&mut self, feature: &str, name: &str, text: &str) -> Result<(), Failure> {
-        let missing = || Failure::Garbled(format!("it offers no `{feature}` with the metadata `{name}`"));
+        let missing = || Failure::Garbled(format!("it has no `{feature}` with the metadata `{name}`"));
         let index = self.standard(feature).ok_or_else(missing)?;
         let of = &self.features[index];
         of.metadata.iter().find(|m| m.element.identifier == name).ok_or_else(missing)?;

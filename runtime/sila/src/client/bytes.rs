@@ -46,7 +46,7 @@ impl Client {
         let parts = bytes.len().div_ceil(WHOLE);
         let size = bytes.len() as u64;
         let count = u32::try_from(parts).ok().filter(|_| size <= LONGEST);
-        let count = count.ok_or_else(|| Failure::Garbled(format!("{size} bytes are too many to be sent")))?;
+        let count = count.ok_or_else(|| Failure::Garbled(format!("{size} bytes are too many to send")))?;
         let create = Create { size, parts: count, parameter: parameter.to_owned() };
         let mut request = Request::new(create);
         // The parameter's command is what the call is for.
@@ -59,7 +59,7 @@ impl Client {
         let heard: Vec<Name> = self.exchanged(PUT, all)?;
         match heard.len() == parts {
             true => Ok(uuid),
-            false => Err(Failure::Garbled(format!("it took {} of {parts} parts of the bytes", heard.len()))),
+            false => Err(Failure::Garbled(format!("it accepted {} of {parts} parts of the bytes", heard.len()))),
         }
     }
 
@@ -67,7 +67,7 @@ impl Client {
         let name = || Name { uuid: uuid.to_owned() };
         let info: Size = self.asked(PathAndQuery::from_static(INFO), Request::new(name()), failure)?;
         if info.size > LONGEST {
-            return Err(Failure::Garbled(format!("it answered with {} bytes, more than can be kept", info.size)));
+            return Err(Failure::Garbled(format!("it replied with {} bytes, more than the limit", info.size)));
         }
         let offsets = (0..info.size).step_by(WHOLE);
         let wanted = |offset: u64| {
@@ -80,13 +80,13 @@ impl Client {
         let mut bytes = Vec::new();
         for part in come {
             if part.offset != bytes.len() as u64 {
-                return Err(Failure::Garbled("parts of the bytes that it answered are missing".to_owned()));
+                return Err(Failure::Garbled("parts of its reply are missing".to_owned()));
             }
             bytes.extend(part.bytes);
         }
         if bytes.len() as u64 != info.size {
             let (size, len) = (info.size, bytes.len());
-            return Err(Failure::Garbled(format!("of {size} bytes that it answered {len} came")));
+            return Err(Failure::Garbled(format!("only {len} of the {size} bytes of its reply arrived")));
         }
         // It lets go of them by itself too.
         let _ = self.asked::<Name, Raw>(PathAndQuery::from_static(DELETE), Request::new(name()), failure);

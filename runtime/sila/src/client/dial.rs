@@ -62,7 +62,7 @@ impl Dial {
 
     async fn open(self) -> io::Result<TokioIo<Box<dyn Stream>>> {
         if self.once.swap(true, Ordering::SeqCst) {
-            return Err(Error::other("it was cut"));
+            return Err(Error::other("it was closed"));
         }
         let stream = TcpStream::connect(&self.place).await?;
         stream.set_nodelay(true)?;
@@ -92,7 +92,7 @@ impl tower::Service<Uri> for Dial {
 fn host(place: &str) -> Result<ServerName<'static>, String> {
     let host = place.rsplit_once(':').map_or(place, |(host, _)| host);
     let host = host.strip_prefix('[').and_then(|h| h.strip_suffix(']')).unwrap_or(host);
-    ServerName::try_from(host.to_owned()).map_err(|_| format!("`{host}` is no name of a host"))
+    ServerName::try_from(host.to_owned()).map_err(|_| format!("`{host}` is not a host name"))
 }
 
 /// What to say of a server that did not answer without encryption, where it would answer with it.
@@ -111,11 +111,10 @@ pub(super) fn encrypted(runtime: &Runtime, place: &str, timeout: Duration) -> Op
         (Some(shown), _) => {
             let fingerprint = shown.split(' ').next().unwrap_or_default();
             format!(
-                "and no certificate of it is trusted. The one that it shows has the fingerprint {fingerprint}: compare it \
-                 with the server's own, and trust it with `fingerprint = \"{fingerprint}\"`"
+                "but its certificate is not trusted. It has the fingerprint {fingerprint}: compare it with that of the server, and trust it with `fingerprint = \"{fingerprint}\"`"
             )
         }
-        (None, Some(error)) if is_tls(error) => "and speaks neither TLS 1.2 nor 1.3".to_owned(),
+        (None, Some(error)) if is_tls(error) => "but supports neither TLS 1.2 nor 1.3".to_owned(),
         _ => return None,
     };
     Some(Failure::Garbled(format!("the server at `{place}` is encrypted (TLS), {how}")))

@@ -19,7 +19,7 @@ use crate::raw::Raw;
 
 impl Client {
     pub(super) fn silent(&self, what: &str) -> Failure {
-        Failure::Lost(format!("it did not answer `{what}` within {} s", self.timeout.as_secs_f64()))
+        Failure::Lost(format!("it did not reply to `{what}` within {} s", self.timeout.as_secs_f64()))
     }
 
     /// A call of a method of a feature, and what goes beside it.
@@ -49,7 +49,7 @@ impl Client {
     fn has_lock(&self) -> Result<(), Failure> {
         match self.lapse.filter(|lapse| self.heard.elapsed() >= *lapse) {
             Some(lapse) => Err(Failure::Lost(format!(
-                "its lock has lapsed, as it heard nothing for more than {} s: others may have used it",
+                "its lock ended because it received nothing for more than {} s: other clients may have used it",
                 lapse.as_secs()
             ))),
             None => Ok(()),
@@ -140,7 +140,7 @@ impl Client {
         let silent = self.silent(path.path().rsplit('/').next().unwrap_or_default());
         let grpc = &mut self.grpc;
         let answer = async {
-            grpc.ready().await.map_err(|e| Failure::Lost(format!("the connection broke off: {}", source(&e))))?;
+            grpc.ready().await.map_err(|e| Failure::Lost(format!("the connection was lost: {}", source(&e))))?;
             call(grpc, path).await.map_err(|s| failed(&s))
         };
         within(&self.runtime, self.timeout, answer).unwrap_or(Err(silent))

@@ -126,7 +126,7 @@ impl Answers {
     pub async fn answer(self: Arc<Self>, request: http::Request<Incoming>) -> http::Response<Body> {
         let (this, path) = (self, request.uri().path().to_owned());
         let Some(meant) = this.meant(&path) else {
-            return Status::unimplemented("there is no such call").into_http();
+            return Status::unimplemented("unknown call").into_http();
         };
         // The first feature is that by which a server tells of itself.
         let known = this.guard.knows(meant.feature() == 0, request.headers());
@@ -283,7 +283,7 @@ impl Answers {
             Ok(None) | Err(_) => return Err(gone()),
         }
         let value = self.executions.add((f, c), cancelled, watched);
-        let value = value.ok_or_else(|| refused(Refusal::NotAccepted, "too many commands go on"))?;
+        let value = value.ok_or_else(|| refused(Refusal::NotAccepted, "too many commands are running"))?;
         tokio::spawn(async move {
             while state.borrow().end.is_none() {
                 match heard.recv().await {

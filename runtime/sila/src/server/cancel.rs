@@ -32,7 +32,8 @@ pub(super) fn feature() -> Feature {
     Feature {
         identifier: IDENTIFIER.to_owned(),
         display: "Cancel Controller".to_owned(),
-        description: "Breaks off commands that go on. What they use is left as it is when they fail.".to_owned(),
+        description: "Cancels running commands. The things that they use stay in their state, as after a failure."
+            .to_owned(),
         originator: "org.silastandard".to_owned(),
         category: "core.commands".to_owned(),
         version: (1, 0),
@@ -45,9 +46,9 @@ pub(super) fn feature() -> Feature {
                     ty: DataType::Identifier(UUID.to_owned()),
                 }],
                 errors: vec![UNKNOWN.to_owned(), UNSUPPORTED.to_owned()],
-                ..command("CancelCommand", "Breaks off one command.")
+                ..command("CancelCommand", "Cancels one command.")
             },
-            command("CancelAll", "Breaks off every command that goes on."),
+            command("CancelAll", "Cancels every running command."),
         ],
         types: vec![Element {
             identifier: UUID.to_owned(),
@@ -59,12 +60,12 @@ pub(super) fn feature() -> Feature {
             Named {
                 identifier: UNKNOWN.to_owned(),
                 display: "Invalid Command Execution UUID".to_owned(),
-                description: "No command with this execution goes on.".to_owned(),
+                description: "No command with this execution is running.".to_owned(),
             },
             Named {
                 identifier: UNSUPPORTED.to_owned(),
                 display: "Operation Not Supported".to_owned(),
-                description: "The command cannot be broken off.".to_owned(),
+                description: "The command cannot be cancelled.".to_owned(),
             },
         ],
         ..Feature::default()

@@ -107,11 +107,11 @@ impl Guard {
         let mut beside = headers.keys().map(|k| k.as_str()).filter(|k| k.starts_with(PREFIX));
         match of_service {
             true => beside.next().map_or(Ok(()), |key| {
-                Err(refused(Refusal::NoMetadata, format!("`{key}` does not go beside calls of SiLAService")))
+                Err(refused(Refusal::NoMetadata, format!("calls of SiLAService take no `{key}`")))
             }),
             false => beside
                 .find(|k| !is_known(k))
-                .map_or(Ok(()), |unknown| Err(refused(Refusal::Metadata, format!("`{unknown}` is not known here")))),
+                .map_or(Ok(()), |unknown| Err(refused(Refusal::Metadata, format!("`{unknown}` is unknown here")))),
         }
     }
 
@@ -130,11 +130,10 @@ impl Guard {
             return Ok(None);
         }
         let given = one(beside, &key(&id(ACCESS), "AccessToken"))?;
-        let given =
-            given.ok_or_else(|| refused(Refusal::Metadata, "log in first: no access token goes beside the call"))?;
+        let given = given.ok_or_else(|| refused(Refusal::Metadata, "log in first: the call has no access token"))?;
         let mut tokens = locked(&self.tokens);
         tokens.retain(|_, token| !token.has_ended());
-        let none = || error(ACCESS, "InvalidAccessToken", "there is no such access token, or it has ended");
+        let none = || error(ACCESS, "InvalidAccessToken", "the access token is unknown or has expired");
         let token = tokens.get_mut(&given).ok_or_else(none)?;
         if !token.features.is_empty() && !token.features.iter().any(|f| f == feature) {
             return Err(error(ACCESS, "InvalidAccessToken", "the access token is for other features"));
@@ -155,11 +154,10 @@ impl Guard {
                 taken.heard = now();
                 Ok(())
             }
-            Some(_) => Err(error(LOCK, "InvalidLockIdentifier", "a client has locked the server with another name")),
-            None => Err(refused(
-                Refusal::Metadata,
-                "a client has locked the server: no lock identifier goes beside the call",
-            )),
+            Some(_) => Err(error(LOCK, "InvalidLockIdentifier", "another client has locked the server")),
+            None => {
+                Err(refused(Refusal::Metadata, "a client has locked the server, and the call has no lock identifier"))
+            }
         }
     }
 
@@ -186,7 +184,7 @@ impl Guard {
             return Err(error(LOCK, "ServerNotLocked", "nobody has locked the server"));
         };
         if taken.name != name {
-            return Err(error(LOCK, "InvalidLockIdentifier", "the server was locked with another name"));
+            return Err(error(LOCK, "InvalidLockIdentifier", "the server was locked with another identifier"));
         }
         *held = None;
         Ok(())
@@ -196,7 +194,7 @@ impl Guard {
     pub fn log_in(&self, user: &str, password: &str, features: Vec<String>) -> Result<(String, i64), Status> {
         let known = self.users.as_ref().is_some_and(|users| users.knows(user, password));
         if !known {
-            return Err(error(LOGIN, "AuthenticationFailed", "the name or the password is another"));
+            return Err(error(LOGIN, "AuthenticationFailed", "the user name or the password is wrong"));
         }
         let mut tokens = locked(&self.tokens);
         tokens.retain(|_, token| !token.has_ended());
@@ -213,7 +211,7 @@ impl Guard {
     /// Ends a token.
     pub fn log_out(&self, token: &str) -> Result<(), Status> {
         let ended = locked(&self.tokens).remove(token);
-        let none = || error(LOGIN, "InvalidAccessToken", "there is no such access token, or it has ended");
+        let none = || error(LOGIN, "InvalidAccessToken", "the access token is unknown or has expired");
         ended.filter(|token| !token.has_ended()).map(|_| ()).ok_or_else(none)
     }
 }
@@ -222,7 +220,7 @@ impl Guard {
 fn one(beside: &MetadataMap, key: &str) -> Result<Option<String>, Status> {
     let mut all = beside.get_all_bin(key).iter();
     let Some(value) = all.next() else { return Ok(None) };
-    let wrong = || refused(Refusal::Metadata, format!("`{key}` holds no text, or is there twice"));
+    let wrong = || refused(Refusal::Metadata, format!("`{key}` must be given once, as a text"));
     let bytes = |value: &BinaryMetadataValue| value.to_bytes().ok().and_then(|bytes| text(&bytes));
     let read = bytes(value).ok_or_else(wrong)?;
     all.next().map_or(Ok(Some(read)), |_| Err(wrong()))

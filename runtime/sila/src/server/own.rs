@@ -75,7 +75,7 @@ impl Answers {
                 let name = text(0);
                 if name.chars().count() > LONGEST_NAME {
                     let identifier = format!("{}/{path}/Parameter/ServerName", feature.id());
-                    let message = format!("a name has at most {LONGEST_NAME} characters");
+                    let message = format!("a name may have at most {LONGEST_NAME} characters");
                     return Err(status(Kind::Validation(Fully { identifier, message })));
                 }
                 self.about.lock().unwrap_or_else(PoisonError::into_inner).name = name;
@@ -106,14 +106,14 @@ impl Answers {
                 self.guard.log_out(&text(0))?;
                 Vec::new()
             }
-            _ => return Err(Status::unimplemented("there is no such call")),
+            _ => return Err(Status::unimplemented("unknown call")),
         };
         encode(feature, &command.responses, &answered).map_err(Status::internal)
     }
 
     fn definition(&self, feature: &Feature, wanted: &str) -> Result<Value, Status> {
         let Some(asked) = self.features.iter().find(|f| f.id() == wanted) else {
-            let message = format!("`{wanted}` is not offered here");
+            let message = format!("this server has no `{wanted}`");
             let failure = Failure::Refused { name: UNIMPLEMENTED.to_owned(), message };
             return Err(failure.status(&feature.id()));
         };
@@ -125,7 +125,7 @@ impl Answers {
         if !self.executions.cancel(named)
             && let Some(name) = named
         {
-            let message = format!("no command with the execution `{name}` goes on");
+            let message = format!("no command with the execution `{name}` is running");
             return Err(Failure::Refused { name: cancel::UNKNOWN.to_owned(), message }.status(&feature.id()));
         }
         Ok(())
@@ -133,7 +133,7 @@ impl Answers {
 
     async fn log_in(self: Arc<Self>, arguments: &[Value]) -> Result<(String, i64), Status> {
         let [user, password, server, features] = arguments else {
-            return Err(Status::internal("a login has four parameters"));
+            return Err(Status::internal("a login needs four parameters"));
         };
         let features = match features {
             Value::List(all) => all.iter().map(shown).collect(),
@@ -141,7 +141,7 @@ impl Answers {
         };
         let own = self.about.lock().unwrap_or_else(PoisonError::into_inner).uuid == shown(server);
         if !own {
-            return Err(guard::error(LOGIN, "AuthenticationFailed", "the server that is meant is another one"));
+            return Err(guard::error(LOGIN, "AuthenticationFailed", "the login is for another server"));
         }
         let (user, password) = (shown(user), shown(password));
         // Passwords are dear to check on purpose; others are answered meanwhile.

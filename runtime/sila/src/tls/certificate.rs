@@ -38,7 +38,7 @@ impl Identity {
 
     /// The SHA-256 of the certificate, as `openssl x509 -fingerprint -sha256` writes it: `AB:01:...`.
     pub fn fingerprint(&self) -> Result<String, String> {
-        super::fingerprint_of(&self.chain).ok_or_else(|| "there is no certificate".to_owned())
+        super::fingerprint_of(&self.chain).ok_or_else(|| "it has no certificate".to_owned())
     }
 
     /// Whether clients can be answered with it; why not.
@@ -52,7 +52,7 @@ pub(super) fn chain(pem: &str) -> Result<Vec<CertificateDer<'static>>, String> {
     let all: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(pem.as_bytes()).collect();
     let all = all.map_err(|e| format!("the certificate cannot be read: {e}"))?;
     if all.is_empty() {
-        return Err("there is no certificate in PEM (`-----BEGIN CERTIFICATE-----`) in it".to_owned());
+        return Err("it contains no certificate in PEM (`-----BEGIN CERTIFICATE-----`)".to_owned());
     }
     Ok(all)
 }
@@ -101,6 +101,6 @@ mod tests {
         assert_eq!(written.len(), 95);
         let other = own("7f3f5b0e-8c57-4d56-9a3e-2c1f0d9b6a11", &hosts).expect("it is made");
         let mixed = super::Identity { chain: identity.chain, key: other.key };
-        assert!(mixed.is_sound().is_err_and(|why| why.contains("do not go together")));
+        assert!(mixed.is_sound().is_err_and(|why| why.contains("do not belong together")));
     }
 }

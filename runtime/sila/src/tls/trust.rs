@@ -92,7 +92,7 @@ impl ServerCertVerifier for Judge {
                 Err(Error::InvalidCertificate(why)) => format!("{why:?}"),
                 Err(other) => other.to_string(),
             },
-            None => "it is another".to_owned(),
+            None => "it is another certificate".to_owned(),
         };
         *self.seen.lock().unwrap_or_else(PoisonError::into_inner) = Some(format!("{} ({why})", fingerprint(shown)));
         Err(Error::InvalidCertificate(CertificateError::ApplicationVerificationFailure))

@@ -82,11 +82,11 @@ fn told(stage: &Stage<'_>, solids: &Solids<'_, '_>, a: InstanceId, b: InstanceId
     let [own, theirs] = [thing, other].map(|id| stage.scene.get(id));
     let [x, y, z] = touch.at.map(|m| m * 1e3 + 0.0);
     let depth = (touch.depth * 1e3).max(1.0);
-    let headline = format!("`{}` and `{}` are in one place", own.name, theirs.name);
-    let label = format!("it is in `{}` at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", theirs.name);
+    let headline = format!("`{}` and `{}` overlap", own.name, theirs.name);
+    let label = format!("it is {depth:.0} mm inside `{}` at ({x:.0}, {y:.0}, {z:.0}) mm", theirs.name);
     let mut d = Diagnostic::error(codes::OVERLAP, own.at.unwrap_or(own.span), headline, label);
     if theirs.span != own.span {
-        d = d.because(theirs.span, format!("`{}` stands here", theirs.name));
+        d = d.because(theirs.span, format!("`{}` is placed here", theirs.name));
     }
     match room::offer(stage, solids, thing) {
         Some(help) => d.help(help),

@@ -49,7 +49,7 @@ fn place(stage: &Stage<'_>, solids: &Solids<'_, '_>, thing: InstanceId, on: Inst
     };
     if at != Pose::IDENTITY && is_free(stage, solids, thing, shift(on), 0.0) {
         let (name, slot) = (&stage.scene.get(thing).name, &stage.scene.get(on).name);
-        return Some(format!("without `at`, `{name}` stands in the middle of `{slot}` and is free"));
+        return Some(format!("without `at`, `{name}` is in the middle of `{slot}` and overlaps nothing"));
     }
     let taken = |place: InstanceId| {
         let mut things = (0..stage.carried.len() as u32).map(InstanceId).filter(|id| *id != thing);

@@ -35,12 +35,12 @@ pub fn finding(
         }
         Refused::OutOfReach(far, _) => {
             let label = match far * 1e3 {
-                mm if mm >= 1.0 => format!("{} stays {mm:.0} mm away", tip(stage, robot)),
-                _ => "it gets there, but not turned like this".to_string(),
+                mm if mm >= 1.0 => format!("{} stays {mm:.0} mm short of it", tip(stage, robot)),
+                _ => "it reaches the place, but not in this orientation".to_string(),
             };
             let headline = match goal {
-                Some(goal) => format!("`{arm}` does not reach `{}`", name(goal)),
-                None => format!("`{arm}` does not get {to}"),
+                Some(goal) => format!("`{arm}` cannot reach `{}`", name(goal)),
+                None => format!("`{arm}` cannot move {to}"),
             };
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
@@ -49,41 +49,41 @@ pub fn finding(
             Diagnostic::error(codes::COLLISION, span, headline, label)
         }
         Refused::NoWay => {
-            let headline = format!("no way was found for `{arm}` {}", to.exactly());
+            let headline = format!("`{arm}` has no collision-free path {}", to.exactly());
             let label = match &more.between {
-                None => "nothing is in the way where it ends, but before".to_string(),
-                Some(m) => format!("straight there, `{}` meets {} at {}", m.mine, m.whom(), m.place()),
+                None => "its target is free, but an obstacle is in the way".to_string(),
+                Some(m) => format!("on the straight path `{}` meets {} at {}", m.mine, m.whom(), m.place()),
             };
             Diagnostic::error(codes::COLLISION, span, headline, label)
         }
         Refused::Swings(item, meeting) => return Some(swing(stage, *item, meeting, span)),
         Refused::Bound(item, other) => {
-            let headline = format!("`{}` moves while `{}` holds `{}` as well", name(robot), name(*other), name(*item));
-            Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold one thing here")
-                .help("let one of them let go first")
+            let headline = format!("`{}` moves while `{}` also holds `{}`", name(robot), name(*other), name(*item));
+            Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold the same thing")
+                .help("release it with one arm first")
         }
         Refused::Tilted(by) => {
-            let headline = format!("what `{arm}` holds tilts on its way {to}");
-            let label = format!("by {:.0} deg at one end of it, more than it may", by.to_degrees());
+            let headline = format!("`{arm}` would tilt its load on the way {to}");
+            let label = format!("by {:.0} deg at one end, more than allowed", by.to_degrees());
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
         Refused::Spills(item, lost) => {
-            let headline = format!("`{}` runs over in the hand of `{arm}`", name(*item));
-            let label = format!("it tilts so far that {:.1} mL run out", lost * 1e6);
+            let headline = format!("`{}` would spill in the gripper of `{arm}`", name(*item));
+            let label = format!("it tilts so far that {:.1} mL would run out", lost * 1e6);
             Diagnostic::error(codes::SPILLED, span, headline, label)
         }
         Refused::Joints(given, there) => {
-            let headline = format!("{given} positions for the {there} joints of `{}`", name(robot));
-            Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, "not one for each")
+            let headline = format!("{given} positions are given for the {there} joints of `{}`", name(robot));
+            Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, "the numbers differ")
         }
         Refused::Beyond(joint) => {
-            let headline = format!("`{joint}` of `{}` does not get to this position", name(robot));
-            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside of its limits")
+            let headline = format!("joint `{joint}` of `{}` cannot reach this position", name(robot));
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside its limits")
         }
         Refused::Fixed => {
-            let headline = format!("`{}` does not drive", name(robot));
-            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "it stands for good")
-                .help("take a robot whose description has joints before its field `base`")
+            let headline = format!("`{}` cannot drive", name(robot));
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "it has no mobile base")
+                .help("use a robot whose description has joints before its field `base`")
         }
         Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
         Refused::StandsOn | Refused::TooWide(..) | Refused::Slips(..) => return None,
@@ -104,7 +104,7 @@ pub fn finding(
         shown.push(at);
         // What has been moved is no longer where its line says.
         if stage.is_where_it_was(id) {
-            found = found.because(at, format!("`{}` stands here", name(id)));
+            found = found.because(at, format!("`{}` is placed here", name(id)));
         }
     }
     Some(found)
@@ -115,11 +115,11 @@ fn met(stage: &Stage<'_>, meeting: &Meeting, arm: &str, goal: Option<InstanceId>
     let (mine, other) = (&meeting.mine, &meeting.other);
     let is_goal = meeting.with.zip(goal).is_some_and(|(with, goal)| stage.whole(with) == stage.whole(goal));
     let headline = match (meeting.before, meeting.end, is_goal) {
-        (true, ..) => format!("`{arm}` stands in `{other}` before it goes {to}"),
+        (true, ..) => format!("`{arm}` already overlaps `{other}` before it moves {to}"),
         (_, true, true) => format!("`{mine}` of `{arm}` does not fit at `{other}`"),
-        (_, true, false) => format!("`{arm}` runs into `{other}` at the end of its way {to}"),
-        (_, false, true) => format!("`{arm}` runs into `{other}` as it comes up to it"),
-        (_, false, false) => format!("`{arm}` runs into `{other}` on its way {to}"),
+        (_, true, false) => format!("`{arm}` would collide with `{other}` at the end of its way {to}"),
+        (_, false, true) => format!("`{arm}` would collide with `{other}` while approaching it"),
+        (_, false, false) => format!("`{arm}` would collide with `{other}` on its way {to}"),
     };
     let part = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
     let depth = (meeting.depth * 1e3).max(1.0);
@@ -139,10 +139,14 @@ fn closed(scene: &Scene, arm: &str, passage: &Passage) -> String {
     match (&passage.gap, &passage.by) {
         (Some(([a, b], wide)), _) => {
             let wide = wide.max(0.0) * 1e3;
-            format!("between `{}` and `{}` are {wide:.0} mm, and `{arm}` needs {needs:.0} mm", name(a), name(b))
+            format!(
+                "the gap between `{}` and `{}` is {wide:.0} mm wide, but `{arm}` needs {needs:.0} mm",
+                name(a),
+                name(b)
+            )
         }
         (None, Some(by)) => format!("`{}` is in the way; `{arm}` needs {needs:.0} mm to pass", name(by)),
-        (None, None) => format!("no gap on the way is as wide as the {needs:.0} mm that `{arm}` needs"),
+        (None, None) => format!("`{arm}` needs a gap of {needs:.0} mm, and there is none on the way"),
     }
 }
 
@@ -190,16 +194,16 @@ impl fmt::Display for Aim<'_> {
 pub fn over(stage: &Stage<'_>, vessel: InstanceId, over: f64, span: Span) -> Diagnostic {
     let name = |id: InstanceId| stage.scene.get(id).name.as_str();
     let arm = stage.held_by(vessel).map_or("a robot", name);
-    let headline = format!("`{}` runs over in the hand of `{arm}`", name(vessel));
+    let headline = format!("`{}` would spill in the gripper of `{arm}`", name(vessel));
     let tilt = stage.tilt_at(vessel, f64::INFINITY).to_degrees();
-    let label = format!("tilted by {tilt:.0} deg, it holds {:.1} mL more than it keeps", over * 1e6);
+    let label = format!("tilted by {tilt:.0} deg, it contains {:.1} mL more than it can hold", over * 1e6);
     Diagnostic::error(codes::SPILLED, span, headline, label)
 }
 
 /// The finding for a part of a thing that runs into something as it moves by itself.
 pub fn swing(stage: &Stage<'_>, id: InstanceId, meeting: &Meeting, span: Span) -> Diagnostic {
     let thing = stage.scene.get(id);
-    let headline = format!("a part of `{}` runs into `{}`", thing.name, meeting.other);
+    let headline = format!("a part of `{}` would collide with `{}`", thing.name, meeting.other);
     let met = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
     let depth = (meeting.depth * 1e3).max(1.0);
     let label = format!("`{}` meets {met} at {}, {depth:.0} mm deep", meeting.mine, meeting.place());
@@ -207,7 +211,7 @@ pub fn swing(stage: &Stage<'_>, id: InstanceId, meeting: &Meeting, span: Span) -
     match meeting.with.filter(|with| stage.is_where_it_was(*with)) {
         Some(with) if stage.scene.get(with).span != span => {
             let name = &stage.scene.get(with).name;
-            found.because(stage.scene.get(with).span, format!("`{name}` stands here"))
+            found.because(stage.scene.get(with).span, format!("`{name}` is placed here"))
         }
         _ => found,
     }
@@ -217,18 +221,18 @@ fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, 
     let (item, by) = (scene.get(item), &scene.get(by).name);
     match refused {
         Refused::Misplaced(far, _) => {
-            let headline = format!("`{by}` is not at `{}`: {:.0} mm are between them", item.name, far * 1e3);
-            let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or let go");
+            let headline = format!("`{by}` is {:.0} mm away from `{}`", item.name, far * 1e3);
+            let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or release");
             Some(found.help(format!("move `{by}` there first; `pick` and `place` do that")))
         }
         Refused::TooWide(width, opening) => {
             let headline = format!("`{by}` does not open wide enough for `{}`", item.name);
-            let label = format!("it is {:.0} mm wide, and the fingers open {:.0} mm", width * 1e3, opening * 1e3);
+            let label = format!("it is {:.0} mm wide, but the fingers open only {:.0} mm", width * 1e3, opening * 1e3);
             Some(Diagnostic::error(codes::TOO_WIDE, span, headline, label))
         }
         Refused::StandsOn => {
-            let headline = format!("`{by}` cannot grip `{}`, on which it stands", item.name);
-            let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "it would have to carry itself");
+            let headline = format!("`{by}` cannot grip `{}`, because it stands on it", item.name);
+            let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "it would carry itself");
             Some(found.because(item.span, format!("`{by}` stands on this")))
         }
         _ => None,

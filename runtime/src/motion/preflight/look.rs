@@ -250,5 +250,5 @@ fn cause(stage: &Stage<'_>, motion: &Motion, why: &Refused) -> Cause {
 
 /// The finding of a refusal, with the step of the library it was found on.
 pub fn on_step(finding: Diagnostic, step: Span) -> Diagnostic {
-    if finding.span() == step { finding } else { finding.because(step, "on this step of it") }
+    if finding.span() == step { finding } else { finding.because(step, "during this step of the call") }
 }

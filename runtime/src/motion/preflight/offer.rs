@@ -173,12 +173,12 @@ fn words(stage: &Stage<'_>, thing: InstanceId, stand: Stand, [dx, dy]: [f64; 2])
     match stand {
         Stand::On(on, at) if stage.is_where_it_was(thing) => {
             let [x, y, _] = at.position;
-            format!("`{name}` is within reach at ({}, {}) mm on `{}`", mm(x), mm(y), stage.scene.get(on).name)
+            format!("`{name}` would be within reach at ({}, {}) mm on `{}`", mm(x), mm(y), stage.scene.get(on).name)
         }
         Stand::Lab(at) if stage.is_where_it_was(thing) => {
             let [x, y, z] = at.position;
-            format!("`{name}` is within reach at ({}, {}, {}) mm", mm(x), mm(y), mm(z))
+            format!("`{name}` would be within reach at ({}, {}, {}) mm", mm(x), mm(y), mm(z))
         }
-        _ => format!("`{name}` is within reach if it stands ({}, {}) mm from there", mm(dx), mm(dy)),
+        _ => format!("`{name}` would be within reach if moved by ({}, {}) mm", mm(dx), mm(dy)),
     }
 }

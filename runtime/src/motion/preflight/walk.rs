@@ -102,10 +102,10 @@ impl<'p> Walk<'p, '_> {
         }
         let span = self.program.plan.get(id).span;
         let site = if self.is_own(span) { span } else { self.sites.last().copied().unwrap_or(span) };
-        let headline = "the motions of this workflow are checked up to here: there are too many";
-        let label = "reach and collisions of later motions are not checked";
+        let headline = "`check` followed the motions of this workflow only up to here: there are too many";
+        let label = "later motions are not checked for reach and collisions";
         let finding = Diagnostic::warning(codes::NOT_ANALYSED, site, headline, label)
-            .help("divide the workflow into several: each is checked in full");
+            .help("split the workflow: each part is then checked in full");
         self.found.push(Found { site, call: None, finding });
     }
 
@@ -225,7 +225,7 @@ impl<'p> Walk<'p, '_> {
         if !must {
             finding.severity = Severity::Warning;
             for (at, held) in choices {
-                finding = finding.because(at, if held { "where this holds" } else { "where this does not hold" });
+                finding = finding.because(at, if held { "if this is true" } else { "if this is false" });
             }
         }
         match self.found.iter_mut().find(|f| f.site == site && f.call == call) {

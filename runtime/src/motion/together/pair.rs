@@ -69,21 +69,20 @@ pub fn finding(program: &Program, (a, b, gap): (&Leg, &Leg, Gap), must: bool) ->
     let part = |leg: &Leg, link: u32| format!("`{}` of `{}`", leg.name(link), name(leg));
     let label = |leg: &Leg| &program.plan.get(leg.step).label;
     let headline = match must {
-        true => format!("`{}` and `{}` are in each other's way, whichever goes first", name(first), name(second)),
+        true => format!("`{}` and `{}` block each other in any order", name(first), name(second)),
         false => format!("`{}` and `{}` may meet at {place}", name(first), name(second)),
     };
-    let here = format!("{} comes to {place}, with `{}`", part(second, theirs), label(second));
-    let there = format!("{} comes to the same place, with `{}`", part(first, mine), label(first));
+    let here = format!("{} reaches {place} during `{}`", part(second, theirs), label(second));
+    let there = format!("{} reaches the same place during `{}`", part(first, mine), label(first));
     let mut found = Diagnostic::error(codes::ROBOTS_MEET, second.site, headline, here);
     if first.site != second.site {
         found = found.because(first.site, there);
     }
     if must {
-        return found.help("put them in a row, and send the first one away before the second one comes");
+        return found.help("put them into one `sequence`, and move the first one away before the second one comes");
     }
     found.severity = Severity::Warning;
     let own = |span: Span| program.files.get(span.file.0 as usize).is_some_and(|f| !f.starts_with("std::"));
-    let help =
-        "in a run one waits for the other: `claim` one thing around both to let them take turns, or put them in a row";
+    let help = "during a run one waits for the other: `claim` one thing around both to let them take turns, or put them into one `sequence`";
     if own(first.site) { found.help(help) } else { found }
 }

@@ -101,13 +101,13 @@ impl Grip<'_, '_> {
         let (name, hand) = (self.name(self.item), self.name(self.by));
         let Some(width) = self.width() else {
             return Err(not_modelled(format!(
-                "`{hand}` grips `{name}` {} from where it is taken to be, and it is not known how wide it is there",
+                "`{hand}` grips `{name}` {} from its assumed place, where its width is unknown",
                 self.far()
             )));
         };
         let Some(ways) = fingers.ways(&actor.tree, &actor.joints, [off[0], 0.0, off[2]]) else {
             return self.missed(format!(
-                "the fingers of `{hand}` close beside `{name}`, which is {} from where it is taken to be",
+                "the fingers of `{hand}` close beside `{name}`, which is {} from its assumed place",
                 self.far()
             ));
         };
@@ -116,7 +116,7 @@ impl Grip<'_, '_> {
         if side < width / 2.0 {
             let room = (ways[0] + ways[1] - width) / 2.0;
             return self.missed(format!(
-                "a finger of `{hand}` hits `{name}`, which is {} off across the fingers: open, they leave {} on either side of it",
+                "a finger of `{hand}` hits `{name}`, which is {} off across the fingers: open fingers leave {} on either side",
                 mm(off[1].abs()),
                 mm(room.max(0.0))
             ));
@@ -126,7 +126,7 @@ impl Grip<'_, '_> {
             && room < off[1].abs()
         {
             return self.missed(format!(
-                "the fingers of `{hand}` push `{name}` {} aside in `{}`, which leaves it {}",
+                "the fingers of `{hand}` push `{name}` {} aside in `{}`, where it has {} of play",
                 mm(off[1].abs()),
                 self.name(hole),
                 mm(room)
@@ -180,7 +180,7 @@ impl Grip<'_, '_> {
         let rubs = [own, tool].map(|tool| self.sliding(tool));
         let (Some(press), Some(hold), [Some(own), Some(theirs)]) = (press, hold, rubs) else {
             return Err(not_modelled(format!(
-                "one finger of `{hand}` presses on `{name}`, which `{other}` holds {} off across them, and not all of their forces and frictions are known",
+                "one finger of `{hand}` presses on `{name}`, which `{other}` holds {} off across them; some of their forces and frictions are unknown",
                 mm(off.abs())
             )));
         };
@@ -189,7 +189,7 @@ impl Grip<'_, '_> {
         let bears = 2.0 * theirs * hold;
         if moves <= bears {
             return self.missed(format!(
-                "only one finger of `{hand}` presses on `{name}`, which is {} off across them: of its {press:.0} N {:.0} N push it along the fingers of `{other}`, whose friction bears {bears:.0} N",
+                "only one finger of `{hand}` presses on `{name}`, which is {} off across them: of its {press:.0} N {:.0} N push it along the fingers of `{other}`, whose friction holds {bears:.0} N",
                 mm(off.abs()),
                 moves.max(0.0)
             ));
@@ -216,34 +216,33 @@ impl Grip<'_, '_> {
     /// A gripper without fingers that move holds it where it meets it: by its whole face, or not at all.
     fn as_it_is(&self, actor: Option<&Actor>) -> Result<Pose, Stray> {
         let (name, hand) = (self.name(self.item), self.name(self.by));
-        let unknown = |what: &str| {
-            not_modelled(format!("`{hand}` grips `{name}` {} from where it is taken to be, {what}", self.far()))
-        };
+        let unknown =
+            |what: &str| not_modelled(format!("`{hand}` grips `{name}` {} from its assumed place, {what}", self.far()));
         if self.real.holder(self.item).is_some_and(|other| other != self.robot) {
             return Err(unknown("while another robot holds it"));
         }
         let Some(radius) = actor.and_then(|actor| self.face(actor)) else {
-            return Err(unknown("and neither its fingers nor the shape of its face are known"));
+            return Err(unknown("and its fingers and the shape of its face are unknown"));
         };
-        let Some(body) = self.solid() else { return Err(unknown("and its shape is not known")) };
+        let Some(body) = self.solid() else { return Err(unknown("and its shape is unknown")) };
         let rim = (0..AROUND).map(|k| {
             let angle = f64::from(k) * std::f64::consts::TAU / f64::from(AROUND);
             [radius * angle.cos(), radius * angle.sin(), 0.0]
         });
         let meant = self.gap(body, &self.thought, [0.0; 3]);
         let Some(meant) = meant.filter(|gap| *gap <= DEEPER) else {
-            return Err(unknown("and its face does not meet it there either"));
+            return Err(unknown("and its face does not touch it there"));
         };
         let beyond = |at: [f64; 3]| self.gap(body, &self.pose, at).is_none_or(|gap| gap > meant + DEEPER);
         if beyond([0.0; 3]) {
             return self.missed(format!(
-                "the face of `{hand}` does not meet `{name}`, which is {} from where it is taken to be",
+                "the face of `{hand}` does not touch `{name}`, which is {} from its assumed place",
                 self.far()
             ));
         }
         if rim.into_iter().any(beyond) {
             return self.missed(format!(
-                "the face of `{hand}`, {} wide, is partly beside `{name}`, which is {} from where it is taken to be",
+                "the face of `{hand}`, {} wide, is partly beside `{name}`, which is {} from its assumed place",
                 mm(2.0 * radius),
                 self.far()
             ));

@@ -195,7 +195,7 @@ fn mm(m: f64) -> String {
 }
 
 fn not_modelled(what: String) -> Stray {
-    let text = format!("{what}: what happens to it then is not modelled with `--unseen`");
+    let text = format!("{what}: `--unseen` does not model what happens then");
     Stray { at: 0.0, failure: "unmovable", text }
 }
 
@@ -273,7 +273,7 @@ fn look(
         let goal = motion.goal().map(|(goal, _)| real.whole(goal));
         let hits_goal = held.is_none() && goal.is_some() && goal == meeting.with.map(|with| real.whole(with));
         let mut text = format!(
-            "`{}` of `{}` runs {} into {} at {}",
+            "`{}` of `{}` goes {} into {} at {}",
             meeting.mine,
             real.scene.get(robot).name,
             mm(meeting.depth),
@@ -283,7 +283,7 @@ fn look(
         for id in meeting.with.into_iter().chain(held) {
             let far = apart(believed.pose(id).position, real.pose(id).position);
             if is_elsewhere(&believed.pose(id), &real.pose(id)) {
-                text.push_str(&format!("; `{}` is {} from where it is taken to be", real.scene.get(id).name, mm(far)));
+                text.push_str(&format!("; `{}` is {} from its assumed place", real.scene.get(id).name, mm(far)));
             }
         }
         return Err(Stray { at, failure: if hits_goal { "missed" } else { "collision" }, text });
@@ -332,12 +332,12 @@ impl<'s> Rim<'s> {
         let (name, hole) = (&real.scene.get(item).name, &real.scene.get(entry.hole).name);
         let Some(room) = entry.room else {
             return Err(not_modelled(format!(
-                "`{name}` comes to `{hole}` {} off its middle, and their shapes do not say what room that leaves",
+                "`{name}` reaches `{hole}` {} off its middle, and their shapes do not tell if it fits",
                 mm(entry.off)
             )));
         };
         let text = format!(
-            "`{name}` hits the rim of `{hole}`: it comes {} off the middle of the hole, which leaves it {} on either side",
+            "`{name}` hits the rim of `{hole}`: it is {} off the middle of the hole, which leaves {} on either side",
             mm(entry.off),
             mm(room.max(0.0))
         );
@@ -377,14 +377,11 @@ fn aimed([believed, real]: [&Stage<'_>; 2], motion: &Motion, performed: &Perform
     }
     let name = &real.scene.get(goal).name;
     let Some(mouth) = real.scene.get(goal).body().mouth() else {
-        return Err(not_modelled(format!(
-            "`{name}` is {} from where it is taken to be, and has no known mouth",
-            mm(far)
-        )));
+        return Err(not_modelled(format!("`{name}` is {} from its assumed place, and its mouth is unknown", mm(far))));
     };
     if far <= mouth / 2.0 {
         return Ok(());
     }
-    let text = format!("it comes {} off the middle of `{name}`, whose mouth is {} wide", mm(far), mm(mouth));
+    let text = format!("it arrives {} off the middle of `{name}`, whose mouth is {} wide", mm(far), mm(mouth));
     Err(Stray { at: performed.duration(), failure, text })
 }

@@ -49,7 +49,7 @@ fn title(run: &Run<'_>, canvas: &Canvas<'_>) -> Result<(), PlotError> {
     let (status, color) = match run.info.status {
         Status::Passed => ("passed", MUTED),
         Status::Missed if run.recording.expectations.iter().all(|e| e.passed) => {
-            ("something was left on or in hand", INK)
+            ("something was left on, open or held", INK)
         }
         Status::Missed => ("an expectation was not met", INK),
         Status::Failed => ("failed", INK),

@@ -41,9 +41,9 @@ fn head(report: &Report) -> Option<String> {
     let status = match report.status {
         Status::Passed => "passed",
         Status::Missed if report.findings.iter().any(|f| f.severity == Severity::Error) => {
-            "something met or came about that must not"
+            "a hazard or an incompatible mixture occurred"
         }
-        Status::Missed if report.expectations.iter().all(|e| e.passed) => "something was left on or in hand",
+        Status::Missed if report.expectations.iter().all(|e| e.passed) => "something was left on, open or held",
         Status::Missed => "an expectation was not met",
         Status::Failed => "failed",
         Status::Cancelled => "cancelled",
@@ -175,7 +175,7 @@ fn timeline(report: &Report) -> Option<String> {
     rest(&mut table, 2, rows.len());
     let never = report.steps.iter().filter(|s| !s.structure && s.start.is_none()).count();
     if never > 0 {
-        table.row(["", "", &format!("({never} never began)"), "", ""]);
+        table.row(["", "", &format!("({never} never started)"), "", ""]);
     }
     section("Time line", &table)
 }
@@ -202,7 +202,7 @@ fn processes(report: &Report) -> Option<String> {
         table.row([process.name.clone(), text]);
     }
     rest(&mut table, 0, rows.len());
-    section("Processes that began or ended", &table)
+    section("Processes that started or ended", &table)
 }
 
 fn events(report: &Report) -> Option<String> {

@@ -105,7 +105,7 @@ impl<'l> Interpreter<'l, '_> {
             said.text.show(value, instance).ok()
         });
         let headline = words.unwrap_or_else(|| hazard.headline());
-        let mut d = Diagnostic::error(hazard.code(), self.site(), headline, "brings it about");
+        let mut d = Diagnostic::error(hazard.code(), self.site(), headline, "this step causes it");
         d.severity = if hazard.grave { Severity::Error } else { Severity::Warning };
         for term in &hazard.terms {
             for (span, text) in self.history(term, facts) {

@@ -70,9 +70,9 @@ impl<'l> Interpreter<'l, '_> {
             return;
         }
         let place = line.sites.last().map(|s| s.span).unwrap_or_default();
-        let headline = format!("`{}` never comes about", wait.condition.text);
-        let d = Diagnostic::error(codes::WAITS_FOR_EVER, place, headline, "waited for here")
-            .help("wait for what the other branches and jobs bring about, and give a `timeout`");
+        let headline = format!("`{}` never becomes true", wait.condition.text);
+        let d = Diagnostic::error(codes::WAITS_FOR_EVER, place, headline, "this step waits for it")
+            .help("wait for a condition that the other branches and jobs cause, and give a `timeout`");
         self.found(d, wait.condition.span);
     }
 

@@ -60,13 +60,13 @@ impl<'l> Interpreter<'l, '_> {
             return;
         }
         let headline = format!(
-            "this comes {} after what it follows, as it waits for what another one has claimed",
+            "this starts {} after the step that it follows, because it waits for a claim",
             show_duration(now - since)
         );
-        let said = format!("must begin within {}", show_duration(limit));
+        let said = format!("must start within {}", show_duration(limit));
         let d = Diagnostic::error(codes::WINDOW_UNMEETABLE, self.plan.get(id).span, headline, said)
             .because(self.claim_of(id), format!("waits {} for this claim", show_duration(waited)))
-            .help("use another device of the kind, or let the other branch or job claim it later");
+            .help("use another device of this kind, or let the other branch or job claim it later");
         self.tell_in_time(d, self.plan.get(id).span, lines.left);
     }
 

@@ -22,7 +22,7 @@ impl Counterfoil {
         File::open(&folder)?.sync_all()?;
         lock(&file).map_err(|taken| match taken {
             Taken::Io(e) => e,
-            Taken::Locked => io::Error::new(ErrorKind::ResourceBusy, "another process has it"),
+            Taken::Locked => io::Error::new(ErrorKind::ResourceBusy, "another process uses it"),
         })?;
         Ok(Counterfoil(file))
     }
@@ -41,7 +41,7 @@ impl Counterfoil {
             return Ok(Some((Counterfoil(file), Chain::default())));
         }
         let chain = Chain::of_head(&text).filter(|chain| chain.id == id);
-        let chain = chain.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it is not as it was written"))?;
+        let chain = chain.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "it was changed after writing"))?;
         Ok(Some((Counterfoil(file), chain)))
     }
 
@@ -56,7 +56,6 @@ impl Counterfoil {
 fn folder() -> io::Result<PathBuf> {
     let given = |key: &str| std::env::var_os(key).map(PathBuf::from).filter(|dir| dir.is_absolute());
     let state = given("XDG_STATE_HOME").or_else(|| Some(given("HOME")?.join(".local/state")));
-    let none =
-        || io::Error::new(ErrorKind::NotFound, "there is no folder for it: neither XDG_STATE_HOME nor HOME is set");
+    let none = || io::Error::new(ErrorKind::NotFound, "it has no folder: neither XDG_STATE_HOME nor HOME is set");
     Ok(state.ok_or_else(none)?.join("matterixc/journals"))
 }

@@ -104,8 +104,10 @@ impl Journal {
     pub fn create(path: &Path) -> Result<Self, JournalError> {
         let sheet = Sheet::create(path).map_err(|taken| match taken {
             Taken::Io(e) if e.kind() == ErrorKind::AlreadyExists => {
-                let there = format!("there is a file `{}` already", path.display());
-                JournalError::File(format!("{there}: give the journal another name, or go on after it with `--resume`"))
+                let there = format!("the file `{}` already exists", path.display());
+                JournalError::File(format!(
+                    "{there}: choose another name for the journal, or resume it with `--resume`"
+                ))
             }
             Taken::Io(e) => JournalError::File(format!("cannot create the journal `{}`: {e}", path.display())),
             Taken::Locked => busy(path),
@@ -146,8 +148,8 @@ impl Journal {
             })?;
         let is_begun = told.is_some_and(|chain| chain.lines > 0);
         if found.is_none() && is_begun && !is_vouched {
-            let why = "nothing on this machine says how far it got, so that it may be an older copy";
-            let help = "see that it is the newest, and go on with `--resume --vouch`";
+            let why = "this computer has no record of its last line, so it may be an older copy";
+            let help = "make sure that it is the newest, then use `--resume --vouch`";
             return Err(JournalError::File(format!(
                 "the journal `{}` has no counterfoil: {why}; {help}",
                 path.display()
@@ -265,7 +267,7 @@ fn busy(path: &Path) -> JournalError {
     let past = File::open(path).ok().and_then(|file| read(BufReader::new(file)).ok()).unwrap_or_default();
     let who = past.entries.iter().rev().find_map(|e| match e {
         Entry::Begin { pid, who, .. } | Entry::Resumed { pid, who, .. } => {
-            Some(format!("process {pid} (begun by {who})"))
+            Some(format!("process {pid} (started by {who})"))
         }
         _ => None,
     });
@@ -297,18 +299,19 @@ fn read_known(from: impl Read, known: Option<&Chain>) -> Result<Past, String> {
     if head.is_empty() {
         return Err("is empty".to_owned());
     }
-    let told = Chain::of_head(&head).filter(|_| is_there).ok_or("does not begin as one")?;
+    let told = Chain::of_head(&head).filter(|_| is_there).ok_or("does not start like a journal")?;
     let mut past = Past { whole: head.len() as u64, chain: told.begun(), entries: Vec::new() };
     past.chain.is_shut = told.is_shut;
     if told.lines == 0 && told != past.chain {
-        return Err("was edited: its head is not as it was written".to_owned());
+        return Err("was edited: its head has changed".to_owned());
     }
     let mut line = Vec::new();
     while next_line(&mut reader, &mut line)? {
         let number = past.chain.lines + 2;
         let text = &line[..line.len() - 1];
         let parsed: Result<Line<Entry>, _> = serde_json::from_slice(text);
-        let Line { after, entry } = parsed.map_err(|e| format!("was edited: line {number} is no line of one: {e}"))?;
+        let Line { after, entry } =
+            parsed.map_err(|e| format!("was edited: line {number} is not a line of a journal: {e}"))?;
         if after != past.chain.last {
             return Err(format!("was edited: line {number} does not follow the line before it"));
         }
@@ -317,7 +320,7 @@ fn read_known(from: impl Read, known: Option<&Chain>) -> Result<Past, String> {
         past.entries.push(entry);
         let is_other = |then: &Chain| past.chain.lines == then.lines && past.chain.last != then.last;
         if is_other(&told) || known.is_some_and(is_other) {
-            return Err(format!("was edited: line {number} is not as it was written"));
+            return Err(format!("was edited: line {number} has changed"));
         }
     }
     if reader.limit() == 0 {
@@ -329,7 +332,7 @@ fn read_known(from: impl Read, known: Option<&Chain>) -> Result<Past, String> {
     if let Some(then) = known.filter(|then| past.chain.lines < then.lines) {
         let (is, was) = (past.chain.lines + 1, then.lines + 1);
         return Err(format!(
-            "is an older copy: it has {is} lines, and {was} had been written when devices were last told something"
+            "is an older copy: it has {is} lines, but {was} were written before the last command to a device"
         ));
     }
     Ok(past)

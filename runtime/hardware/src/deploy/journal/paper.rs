@@ -86,7 +86,7 @@ impl Sheet {
             return Err(io::Error::new(ErrorKind::NotFound, "it was removed, moved or replaced"));
         }
         if own.len() != self.length {
-            let why = format!("somebody else wrote to it: it has {} bytes, not {}", own.len(), self.length);
+            let why = format!("another program wrote to it: it has {} bytes, not {}", own.len(), self.length);
             return Err(io::Error::other(why));
         }
         Ok(())
@@ -109,7 +109,7 @@ impl Sheet {
 }
 
 fn not_a_file() -> io::Error {
-    io::Error::new(ErrorKind::InvalidInput, "it is no regular file")
+    io::Error::new(ErrorKind::InvalidInput, "it is not a regular file")
 }
 
 /// One process at a time, for as long as the file is open.

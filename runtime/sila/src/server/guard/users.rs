@@ -29,13 +29,13 @@ impl Users {
                 Err(_) => return wrong(format!("the password of `{name}` is not hashed with bcrypt (`htpasswd -B`)")),
                 Ok(parts) if parts.get_cost() > DEAREST => {
                     return wrong(format!(
-                        "the password of `{name}` is too dear to check: at most `htpasswd -C {DEAREST}`"
+                        "the password of `{name}` takes too long to check: use at most `htpasswd -C {DEAREST}`"
                     ));
                 }
                 Ok(_) => {}
             }
             if users.insert(name.to_owned(), hash.to_owned()).is_some() {
-                return wrong(format!("`{name}` is there twice"));
+                return wrong(format!("`{name}` is listed twice"));
             }
         }
         if users.is_empty() { Err("it names no user".to_owned()) } else { Ok(Users(users)) }
@@ -77,8 +77,8 @@ mod tests {
             ("ana", "line 1: it is not `NAME:HASH`"),
             ("\nana:secret", "line 2: the password of `ana` is not hashed"),
             ("ana:{SHA}W6ph5Mm5Pz8GgiULbPgzG37mj9g=", "not hashed with bcrypt"),
-            (&format!("ana:{}", hash.replace("$04$", "$31$")), "too dear"),
-            (&format!("ana:{hash}\nana:{hash}"), "line 2: `ana` is there twice"),
+            (&format!("ana:{}", hash.replace("$04$", "$31$")), "takes too long"),
+            (&format!("ana:{hash}\nana:{hash}"), "line 2: `ana` is listed twice"),
             ("# nobody", "names no user"),
         ] {
             assert!(Users::read(text).is_err_and(|why| why.contains(wanted)), "{text}");
