@@ -90,7 +90,7 @@ class Row:
         self.what, self.value, self.source, self.second = what, value, source, second
 
     def remark(self):
-        if self.source in ("kopp", "fit", "gir", "aq", "aqs"):
+        if self.source in ("kopp", "fit", "gir", "aq", "aqs", "aqd", "aqa"):
             return ""
         if self.second is None:
             return " alone"
