@@ -201,7 +201,8 @@ def solid_of(row):
 
 
 def crystallising(row):
-    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a solid, by least squares; how far off; their sources."""
+    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a solid, by least squares; how far off; their sources. With
+    two of them A4 is 0."""
     _, numbers, points = solid_of(row)
     basis, logs = [], []
     for point in points:
@@ -210,7 +211,10 @@ def crystallising(row):
         basis.append([1, 1e3 / kelvin, math.log10(kelvin / T0)])
         logs.append(saturated(numbers, point["formula"], float(point["mass_percent"]), celsius, row["module"] == "crystals"))
     matrix = [[sum(b[i] * b[k] for b in basis) for k in range(3)] for i in range(3)]
-    a, b, c = solved(matrix, [sum(row_[i] * value for row_, value in zip(basis, logs)) for i in range(3)])
+    right = [sum(row_[i] * value for row_, value in zip(basis, logs)) for i in range(3)]
+    if len(points) == 2:
+        matrix[2], right[2] = [0, 0, 1], 0
+    a, b, c = solved(matrix, right)
     worst = max(abs(sum(x * y for x, y in zip((a, b, c), row_)) - value) for row_, value in zip(basis, logs))
     order = sum(count for name, count in numbers.items() if count > 0 and name != "water")
     names = sorted({point["source"] for point in points})
