@@ -94,6 +94,7 @@ fn potassium_sulfate_dissolves_by_pitzer_as_the_handbook_has_it() {
         let text = format!(
             "mtx 1
 use std::brines
+use std::salts
 use std::glassware::Beaker250mL
 asset Brine: Beaker250mL {{ contents: {{ activities: pitzer }} }}
 lab bench {{
