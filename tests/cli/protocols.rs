@@ -19,10 +19,10 @@ fn definition(category: &str, rows: usize, columns: usize, [depth, diameter, vol
     json!({ "metadata": { "displayCategory": category }, "parameters": { "isTiprack": category == "tipRack" }, "wells": wells, "ordering": ordering })
 }
 
-fn load(id: &str, load_name: &str, slot: &str, definition: Value) -> Value {
+fn load(id: &str, (load_name, version): (&str, u32), slot: &str, definition: Value) -> Value {
     json!({
         "commandType": "loadLabware",
-        "params": { "location": { "slotName": slot }, "loadName": load_name, "namespace": "opentrons", "version": 1, "displayName": id },
+        "params": { "location": { "slotName": slot }, "loadName": load_name, "namespace": "opentrons", "version": version, "displayName": id },
         "result": { "labwareId": id, "definition": definition },
     })
 }
@@ -45,9 +45,19 @@ const DEPTHS: [f64; 2] = [10.67, 37.8];
 fn analysis(steps: Vec<Value>) -> Value {
     let mut commands = vec![
         command("home", json!({})),
-        load("tips", "opentrons_96_tiprack_300ul", "1", definition("tipRack", 8, 12, [59.3, 5.2, 300.0])),
-        load("plate", "corning_96_wellplate_360ul_flat", "2", definition("wellPlate", 8, 12, [DEPTHS[0], 6.86, 360.0])),
-        load("stock", "opentrons_24_tuberack_eppendorf_1.5ml_safelock_snapcap", "3", definition("tubeRack", 4, 6, [DEPTHS[1], 8.7, 1500.0])),
+        load("tips", ("opentrons_96_tiprack_300ul", 1), "1", definition("tipRack", 8, 12, [59.3, 5.2, 300.0])),
+        load(
+            "plate",
+            ("corning_96_wellplate_360ul_flat", 2),
+            "2",
+            definition("wellPlate", 8, 12, [DEPTHS[0], 6.86, 360.0]),
+        ),
+        load(
+            "stock",
+            ("opentrons_24_tuberack_eppendorf_1.5ml_safelock_snapcap", 1),
+            "3",
+            definition("tubeRack", 4, 6, [DEPTHS[1], 8.7, 1500.0]),
+        ),
         json!({ "commandType": "loadPipette", "params": { "pipetteName": "p300_single_gen2", "mount": "left" }, "result": { "pipetteId": "p" } }),
     ];
     commands.extend(steps);
@@ -121,7 +131,10 @@ fn a_protocol_comes_back_with_its_heights() {
 fn what_cannot_be_said_is_listed_and_stands_in_the_text() {
     let dir = folder("left_out");
     let mut steps = fill();
-    steps.insert(3, command("moveToCoordinates", json!({ "pipetteId": "p", "coordinates": { "x": 1, "y": 2, "z": 3 } })));
+    steps.insert(
+        3,
+        command("moveToCoordinates", json!({ "pipetteId": "p", "coordinates": { "x": 1, "y": 2, "z": 3 } })),
+    );
     write(&dir, "a.json", analysis(steps).to_string());
     let imported = matterixc_in(&dir, &["import", "opentrons", "a.json"]);
     assert_eq!(imported.code, 0, "{}", imported.err);
