@@ -15,8 +15,18 @@ pub(super) struct Pipette {
     pub(super) asset: String,
     /// Channels in a row.
     pub(super) channels: usize,
-    /// How fast it aspirates, dispenses and blows out by default, uL/s.
-    pub(super) flows: [f64; 3],
+    /// How fast it aspirates by default, uL/s.
+    flow: f64,
+    /// How fast it dispenses and blows out, if that is not as fast as it aspirates.
+    others: [Option<f64>; 2],
+}
+
+impl Pipette {
+    /// How fast it aspirates, dispenses and blows out where a lab says no more than how fast it aspirates, uL/s.
+    pub(super) fn flows(&self, flow: Option<f64>) -> [f64; 3] {
+        let flow = flow.unwrap_or(self.flow);
+        [flow, self.others[0].unwrap_or(flow), self.others[1].unwrap_or(flow)]
+    }
 }
 
 /// What the library has.
@@ -52,9 +62,8 @@ impl Library {
                 Some(flow) => {
                     let is_row = |line: &AssetLine| matches!(line, AssetLine::Grid(grid) if grid.to.is_some());
                     let channels = if lines.iter().any(is_row) { 8 } else { 1 };
-                    let out_flow = field("flow_out").and_then(quantity).unwrap_or(flow);
-                    let blow = field("flow_blow").and_then(quantity).unwrap_or(flow);
-                    let pipette = Pipette { asset, channels, flows: [flow, out_flow, blow] };
+                    let others = ["flow_out", "flow_blow"].map(|key| field(key).and_then(quantity));
+                    let pipette = Pipette { asset, channels, flow, others };
                     out.pipettes.insert(model.to_owned(), pipette);
                 }
                 None => drop(out.modules.insert(model.to_owned(), asset)),

@@ -68,8 +68,11 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
 fn flows(analysis: &Analysis, deck: &Deck) -> BTreeMap<String, [f64; 3]> {
     let mut out = BTreeMap::new();
     for (id, mounted) in &deck.pipettes {
-        let mut flows = mounted.pipette.flows;
+        let mut flows = mounted.pipette.flows(None);
         for (which, name) in ["aspirate", "dispense", "blowout"].iter().enumerate() {
+            if which == 1 {
+                flows = mounted.pipette.flows(Some(flows[0]));
+            }
             let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
             let of = analysis.commands.iter().filter(|c| c.command_type == *name && c.text("pipetteId") == id);
             of.filter_map(|c| c.number("flowRate")).for_each(|rate| *counts.entry(rate.to_bits()).or_default() += 1);
@@ -177,9 +180,10 @@ impl Page<'_> {
             .pipettes
             .iter()
             .map(|(id, mounted)| {
-                let own = mounted.pipette.flows;
-                let flows = self.flows.get(id).copied().unwrap_or(own);
-                let said = ["flow", "flow_out", "flow_blow"].iter().zip(flows).zip(own);
+                let flows = self.flows.get(id).copied().unwrap_or(mounted.pipette.flows(None));
+                let usual = mounted.pipette.flows(None)[0];
+                let [_, out, blow] = mounted.pipette.flows(Some(flows[0]));
+                let said = ["flow", "flow_out", "flow_blow"].iter().zip(flows).zip([usual, out, blow]);
                 let other: Vec<String> = said
                     .filter(|((_, flow), own)| (flow - own).abs() > 1e-9 * own)
                     .map(|((name, flow), _)| format!("{name}: {} uL/s", number(flow)))

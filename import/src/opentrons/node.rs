@@ -283,12 +283,12 @@ mod tests {
         let wells = ["A1", "B1", "C1", "D1"];
         let steps = wells.iter().flat_map(|w| {
             let mix = [about("take", "plate", w), about("give", "plate", w)];
-            [Node::plain("pick"), about("take", "stock", "A1"), about("give", "plate", w)]
+            [Node::plain("pick"), about("take", "stock", "A1"), about("put", "plate", w)]
                 .into_iter()
                 .chain(mix.clone())
                 .chain(mix)
         });
-        let expected = "for well in plate[A1 .. D1] {\npick\ntake stock[A1]\ngive well\nrepeat 2 times {\ntake well\ngive well\n}\n}\n";
+        let expected = "for well in plate[A1 .. D1] {\npick\ntake stock[A1]\nput well\nrepeat 2 times {\ntake well\ngive well\n}\n}\n";
         assert_eq!(text(steps.collect()), expected);
     }
 
