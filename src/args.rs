@@ -85,6 +85,8 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Show the library's data of a substance, with the source of each number.
     Substance(SubstanceArgs),
+    /// List the definitions of labware in the library, or print one.
+    Labware(LabwareArgs),
     /// Serve check, fix, run and other tools to an assistant, over the Model Context Protocol on standard input and output.
     Mcp(McpArgs),
     /// Create a small project that checks, runs and passes.
@@ -607,6 +609,8 @@ pub struct EmitArgs {
 pub enum Foreign {
     /// A database of PHREEQC, as `phreeqc.dat` or `wateq4f.dat`: equilibria in water, with activity coefficients.
     Phreeqc,
+    /// The analysis of a protocol for the OT-2 (`opentrons analyze --json-output`), or a JSON protocol: a lab, and a workflow with loops.
+    Opentrons,
 }
 
 /// `matterixc import`.
@@ -694,6 +698,28 @@ pub enum SubstanceFormat {
     Human,
     /// One JSON object, described in docs/substances.md.
     Json,
+}
+
+/// `matterixc labware`.
+#[derive(Debug, Args)]
+pub struct LabwareArgs {
+    /// Words that stand in the name, the title or the kind: `nest 96`, `TubeRack`; or a name, `NAME/VERSION` for a version of it.
+    #[arg(value_name = "WORD")]
+    pub words: Vec<String>,
+    /// Form of the answer.
+    #[arg(long, value_enum, default_value_t = LabwareFormat::Human)]
+    pub format: LabwareFormat,
+}
+
+/// Form of what is known of labware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LabwareFormat {
+    /// A list to read, or a page on the only one.
+    Human,
+    /// A list of JSON objects, described in docs/labware.md.
+    Json,
+    /// The definition of a name, as a file of your own that you can change.
+    Definition,
 }
 
 /// `matterixc new`.

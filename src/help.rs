@@ -6,7 +6,7 @@ use crate::args::Cli;
 
 /// Subcommands by what they are for; some stand only in some builds.
 const GROUPS: [(&str, &[&str]); 4] = [
-    ("Write", &["new", "check", "fmt", "test", "explain", "substance", "doc", "bill", "import"]),
+    ("Write", &["new", "check", "fmt", "test", "explain", "substance", "labware", "doc", "bill", "import"]),
     ("Run on the digital twin", &["run", "study", "fit", "plan", "verify", "view"]),
     ("Work with devices", &["deploy", "emulate", "serve", "discover", "emit"]),
     ("Editors, assistants, shells", &["lsp", "mcp", "completions", "man", "version", "help"]),

@@ -103,6 +103,7 @@ fn dispatch(cli: Cli) -> Exit {
         Command::View(args) => command::view(&args, cli.color),
         Command::Lsp(args) => command::lsp(&args),
         Command::Explain(args) => command::explain(&args),
+        Command::Labware(args) => command::labware(&args),
         Command::Substance(args) => command::substance(&args),
         Command::Mcp(args) => command::mcp(&args),
         Command::New(args) => command::new(&args),

@@ -3,9 +3,9 @@
 Writes identifiers.csv, values.csv and estimates.csv, from which make.py writes the module. Run it only to add substances or sources:
 
     python3 -m venv venv && venv/bin/pip install chemicals==1.5.2 rdkit==2026.9.1
-    venv/bin/python gather.py --aqsol curated-solubility-dataset.csv --obigt OBIGT/
+    venv/bin/python gather.py --aqsol curated-solubility-dataset.csv --sets data/ --obigt OBIGT/
 
-AqSolDB is at doi 10.7910/DVN/OVHAW8; OBIGT is `inst/extdata/OBIGT` of CHNOSZ 2.2.0. SOURCES.md tells the terms of each source.
+AqSolDB is at doi 10.7910/DVN/OVHAW8, the sets that it was curated from beside its code (mcsorkun/AqSolDB, `data/`); OBIGT is `inst/extdata/OBIGT` of CHNOSZ 2.2.0. SOURCES.md tells the terms of each source.
 """
 import argparse
 import csv
@@ -50,6 +50,8 @@ WIDER = {
     "melting_point": (5.0, 0.012), "boiling_point": (5.0, 0.012), "heat_capacity": (0.0, 0.1),
     "heat_of_vaporization": (0.0, 0.06), "solid_density": (0.0, 0.06),
 }
+# How far values of AqSolDB's sets may be from their median, in log10, and how far above it one of them may stray.
+SETS_AGREE, SETS_STRAY = 0.1, 1.0
 # An open source is preferred to the handbook only where both say the same to this.
 SAME = {"melting_point": 0.35, "boiling_point": 0.35, "flash_point": 1.2}
 
@@ -171,6 +173,10 @@ class Sources:
             if cas is not None:
                 self.chemsep[cas.get("value")] = compound
         self.aqsol = {row["InChIKey"]: row for row in aqsol(args.aqsol)}
+        self.sets = {}
+        for path in sorted(args.sets.glob("dataset-*.csv")):
+            for row in rows(path):
+                self.sets.setdefault(row["InChIKey"], []).append(float(row["Solubility"]))
         self.obigt = {}
         for name in ["organic_liq", "organic_cr", "inorganic_cr", "organic_aq", "inorganic_aq"]:
             for row in rows(args.obigt / f"{name}.csv"):
@@ -363,8 +369,23 @@ def candidates(of, substance, known):
     if row and int(row["Occurrences"]) >= 2 and float(row["SD"]) <= 0.15:
         grams = 10 ** float(row["Solubility"]) * mass
         if grams < 100:
-            out["solubility"] = grams, float(row["SD"])
+            out["solubility"] = grams, "aqs", f"sd {float(row['SD']):.2g}"
+    if "solubility" not in out and key in of.sets and phase != "gas":
+        found = of_sets(of.sets[key], phase)
+        if found and 10 ** found[0] * mass < 100:
+            out["solubility"] = 10 ** found[0] * mass, *found[1:]
     return out
+
+
+def of_sets(values, phase):
+    """log10 of a solubility in mol/L on which most of AqSolDB's sets agree, or of a solid the only one; its source, and how many there are."""
+    middle = statistics.median(values)
+    near = [value for value in values if abs(value - middle) <= SETS_AGREE]
+    if max(values) - middle > SETS_STRAY:
+        return None
+    if len(near) >= 2 and 2 * len(near) > len(values):
+        return statistics.median(near), "aqd", f"{len(near)} of {len(values)}"
+    return (values[0], "aqa", "1 of 1") if len(values) == 1 and phase == "solid" else None
 
 
 def choose(what, by):
@@ -492,6 +513,7 @@ def phase_of(of, substance):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--aqsol", type=Path, required=True)
+    parser.add_argument("--sets", type=Path, required=True)
     parser.add_argument("--obigt", type=Path, required=True)
     args = parser.parse_args()
     of = Sources(args)
@@ -544,7 +566,7 @@ def main():
                 values.append([s["name"], "heat_capacity", f"{by[1]:.4g}", "aq", "", "", by[2]])
                 continue
             elif what == "solubility":
-                values.append([s["name"], what, f"{by[0]:.2g}", "aqs", "", "", f"sd {by[1]:.2g}"])
+                values.append([s["name"], what, f"{by[0]:.2g}", by[1], "", "", by[2]])
                 continue
             else:
                 got = choose(what, by)

@@ -40,6 +40,12 @@ HAZARDS = {
 }
 
 
+# Solids that have H260, H261 or EUH014 in Regulation (EC) 1272/2008: they react with water, and do not dissolve.
+REACTS = {
+    "Li", "K", "Ca", "lithium_aluminium_hydride", "lithium_hydride", "calcium_hydride", "potassium_hydride", "CaC2", "phosphorus_pentachloride",
+}
+
+
 def rows(name):
     with open(HERE / name, encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
@@ -90,7 +96,7 @@ class Row:
         self.what, self.value, self.source, self.second = what, value, source, second
 
     def remark(self):
-        if self.source in ("kopp", "fit", "gir", "aq", "aqs"):
+        if self.source in ("kopp", "fit", "gir", "aq", "aqs", "aqd", "aqa"):
             return ""
         if self.second is None:
             return " alone"
@@ -205,6 +211,8 @@ def entry(row, ids, by):
         out += f'    smiles: "{smiles}"\n'
     out += f'    formula: "{usual(row, ids["formula"])}"\n    cas: "{row["cas"]}"\n    phase: "{ids["phase"]}"\n'
     out += "".join(by[what].line() for what in ORDER if what in by)
+    if row["name"] in REACTS:
+        out += "    reacts_with_water: true\n"
     if row["groups"]:
         out += f"    reactive_groups: [{row['groups'].replace(' ', ', ')}]\n"
     if row["hazards"]:

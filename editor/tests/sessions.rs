@@ -229,12 +229,12 @@ const PLATED: &str = "mtx 1\nuse std::opentrons\nasset Plate from labware \"plat
 
 #[test]
 fn verdicts_fall_with_the_files_that_a_text_names() {
-    let json = include_str!("../../assets/labware/nest_12_reservoir_15ml.json");
-    let texts = BTreeMap::from([("plate.json".to_string(), json.to_string())]);
+    let json = matterix_lang::labware::library::find("nest_12_reservoir_15ml/1").expect("it").text().expect("its text");
+    let texts = BTreeMap::from([("plate.json".to_string(), json.clone())]);
     let beside = Texts(RefCell::new(texts));
     let mut session = Session::default();
     let before = Analysis::of("plated", PLATED, &beside, &mut session).findings;
-    let smaller = json.replace("\"totalLiquidVolume\": 15000", "\"totalLiquidVolume\": 11000");
+    let smaller = json.replace("\"totalLiquidVolume\":15000", "\"totalLiquidVolume\":11000");
     assert_ne!(smaller, json);
     beside.0.borrow_mut().insert("plate.json".to_string(), smaller);
     same("plated", PLATED, &beside, &mut session);

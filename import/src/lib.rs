@@ -2,6 +2,7 @@
 //!
 //! An importer says what it has left out and why; nothing is dropped in silence, and nothing is guessed.
 
+pub mod opentrons;
 pub mod phreeqc;
 
 /// Why a file cannot be imported.
@@ -16,7 +17,7 @@ pub struct Mistake {
 /// What a file has that its module has not.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOut {
-    /// Line of the file, from 1.
+    /// Line of the file, or number of the command, from 1.
     pub line: usize,
     /// As the file calls it.
     pub name: String,
@@ -31,4 +32,6 @@ pub struct Imported {
     pub text: String,
     /// What is left out, in the order of the file.
     pub left_out: Vec<LeftOut>,
+    /// Files that stand beside it, by name.
+    pub files: Vec<(String, String)>,
 }

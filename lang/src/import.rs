@@ -9,6 +9,7 @@ use matterix_ir::{Diagnostic, FileId, Sources, codes};
 use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, File, ItemKind, Member, MemberKind, Name, Path};
 use crate::loader::Loader;
 use crate::names::Names;
+use crate::near::question;
 use crate::units::Units;
 use crate::{labware, library, sila};
 
@@ -53,7 +54,7 @@ pub fn texts(names: &Names<'_>, format: &str, loader: &dyn Loader) -> BTreeMap<S
         _ => None,
     });
     let read = named.filter_map(|(module, path)| {
-        let text = text(names.modules[module].file, &path.text, loader).ok()?;
+        let text = source_text(names.modules[module].file, format, &path.text, loader).ok()?;
         Some((path.text.clone(), text))
     });
     read.collect()
@@ -141,9 +142,9 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
         lines.extend(meshes);
         let Some((word, path)) = source else { continue };
         let Some(format) = FORMATS.iter().find(|f| f.word == word.text) else { continue };
-        let read = text(file, &path.text, loader).and_then(|text| {
+        let read = source_text(file, &word.text, &path.text, loader).and_then(|text| {
             (format.read)(&text, path, &mut beside)
-                .map_err(|reason| format!("`{}` is not a {}: {reason}", path.text, format.holds))
+                .map_err(|reason| format!("`{}` is no {}: {reason}", path.text, format.holds).into())
         });
         match read {
             Ok((given, kind)) => {
@@ -152,8 +153,8 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
                 }
                 lines.extend(given);
             }
-            Err(headline) => {
-                beside.found.push(Diagnostic::error(format.code, path.span, headline, "this file"));
+            Err(unread) => {
+                beside.found.push(unread.told(format.code, path));
                 // What it would have given is not missed again.
                 lines.push(AssetLine::Error(path.span));
             }
@@ -222,6 +223,67 @@ impl Beside<'_> {
                 self.found.push(Diagnostic::error(codes::MESH_FILE, description.span, headline, "named in this file"));
                 None
             }
+        }
+    }
+}
+
+/// Why there is nothing to read, and the names that may be meant.
+struct Unread {
+    headline: String,
+    near: Vec<String>,
+    help: Option<String>,
+}
+
+impl From<String> for Unread {
+    fn from(headline: String) -> Self {
+        Unread { headline, near: Vec::new(), help: None }
+    }
+}
+
+impl Unread {
+    fn told(self, code: codes::Code, path: &Name) -> Diagnostic {
+        let mut d = Diagnostic::error(code, path.span, self.headline, "this file");
+        d.help.extend(self.help.into_iter().chain(question(&self.near)));
+        match self.near.first() {
+            Some(best) => d.guess(format!("replace with `{best}`"), path.span, format!("\"{best}\"")),
+            None => d,
+        }
+    }
+}
+
+/// The text that an asset comes from: of labware, a definition of the library by its name; else that of a file.
+fn source_text(from: FileId, format: &str, path: &str, loader: &dyn Loader) -> Result<String, Unread> {
+    if format != "labware" {
+        return Ok(text(from, path, loader)?);
+    }
+    if labware::library::is_name(path) {
+        let missing = match labware::library::find(path) {
+            Ok(entry) => return Ok(entry.text()?),
+            Err(missing) => missing,
+        };
+        // A file may be called like that too.
+        return loader.file(from, path).map_err(|_| no_definition(path, missing));
+    }
+    let unread = |reason: String| {
+        let name = path.strip_suffix(".json").and_then(|name| labware::library::find(name).ok());
+        let help = name.map(|entry| format!("the library's definition is named without `.json`: `{}`", entry.name));
+        Unread { help, ..Unread::from(format!("cannot read `{path}`: {reason}")) }
+    };
+    loader.file(from, path).map_err(unread)
+}
+
+/// A name that the library does not have.
+fn no_definition(path: &str, missing: labware::library::Missing) -> Unread {
+    let list = "`matterixc labware WORD` lists the names with a word in them; a file of yours ends with `.json`";
+    match missing {
+        labware::library::Missing::Name(near) => {
+            let help = near.is_empty().then(|| list.to_owned());
+            Unread { headline: format!("the library has no labware definition `{path}`"), near, help }
+        }
+        labware::library::Missing::Version(versions) => {
+            let known: Vec<String> = versions.iter().map(u32::to_string).collect();
+            let help = format!("it has version {}", matterix_ir::listing::joined(&known, "and"));
+            Unread { help: Some(help), ..Unread::from(format!("the library has no labware definition `{path}`")) }
         }
     }
 }

@@ -18,7 +18,7 @@ mod hints;
 pub mod import;
 pub mod inventory;
 mod labs;
-mod labware;
+pub mod labware;
 pub mod library;
 pub mod load;
 pub mod loader;

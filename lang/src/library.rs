@@ -62,13 +62,6 @@ macro_rules! files {
 }
 
 files! {
-    "labware/" => "corning_96_wellplate_360ul_flat.json"
-    "labware/" => "nest_12_reservoir_15ml.json"
-    "labware/" => "opentrons_1_trash_1100ml_fixed.json"
-    "labware/" => "opentrons_24_tuberack_eppendorf_1.5ml_safelock_snapcap.json"
-    "labware/" => "opentrons_96_tiprack_1000ul.json"
-    "labware/" => "opentrons_96_tiprack_20ul.json"
-    "labware/" => "opentrons_96_tiprack_300ul.json"
     "robots/fr3/" => "fr3.urdf"
     "robots/franka_hand/" => "franka_hand.urdf"
     "robots/iiwa14/" => "iiwa14.urdf"

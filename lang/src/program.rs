@@ -977,7 +977,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         let (inertial, friction) = (lab.inertial(id, &geometry), lab.friction(id));
         let force = lab.force(id);
         let stopover = lab.is_stopover(id);
-        let Geometry { frames, shape, solids, room, moving, collision, visual } = geometry;
+        let Geometry { frames, shape, solids, room, moving, collision, visual, inside: _ } = geometry;
         instances.push(SceneInstance {
             name,
             kind: lab.kind_names(id),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use matterix_import::{Imported, LeftOut, Mistake, phreeqc};
+use matterix_import::{Imported, LeftOut, Mistake, opentrons, phreeqc};
 
 use crate::args::{Foreign, ImportArgs};
 use crate::terminal::{self, print_error};
@@ -30,8 +30,9 @@ fn attempt(args: &ImportArgs) -> Result<Exit, String> {
             };
             phreeqc::import(&text, &title, &wanted)
         }
+        Foreign::Opentrons => opentrons::import(&text, &title),
     };
-    let Imported { text, left_out } = match imported {
+    let Imported { text, left_out, files: beside } = match imported {
         Ok(imported) => imported,
         Err(mistake) => {
             print_error(&complaint(&args.file, &mistake));
@@ -39,10 +40,26 @@ fn attempt(args: &ImportArgs) -> Result<Exit, String> {
         }
     };
     match &args.out {
-        Some(path) => files::write(path, &text)?,
-        None => terminal::pour(text.as_bytes()),
+        Some(path) => {
+            files::write(path, &text)?;
+            for (name, text) in &beside {
+                files::write(&path.with_file_name(name), text)?;
+            }
+        }
+        None => {
+            terminal::pour(text.as_bytes());
+            let names: Vec<&str> = beside.iter().map(|(name, _)| name.as_str()).collect();
+            if !names.is_empty() {
+                let said = format!("with `--out FILE` these definitions are written beside it: {}\n", names.join(", "));
+                terminal::print(terminal::Stream::Err, &said);
+            }
+        }
     }
-    for line in summary(&left_out) {
+    let place = match args.kind {
+        Foreign::Phreeqc => "line",
+        Foreign::Opentrons => "command",
+    };
+    for line in summary(&left_out, place) {
         terminal::print(terminal::Stream::Err, &format!("{line}\n"));
     }
     Ok(Exit::Fine)
@@ -56,13 +73,14 @@ fn complaint(file: &Path, mistake: &Mistake) -> String {
 }
 
 /// What is left out, a line for each reason.
-fn summary(left_out: &[LeftOut]) -> Vec<String> {
+fn summary(left_out: &[LeftOut], place: &str) -> Vec<String> {
     let mut by_reason: BTreeMap<&str, Vec<&LeftOut>> = BTreeMap::new();
     for left in left_out {
         by_reason.entry(&left.why).or_default().push(left);
     }
     let line = |(why, all): (&&str, &Vec<&LeftOut>)| {
-        let names: Vec<String> = all.iter().take(MOST_NAMES).map(|l| format!("{} (line {})", l.name, l.line)).collect();
+        let names: Vec<String> =
+            all.iter().take(MOST_NAMES).map(|l| format!("{} ({place} {})", l.name, l.line)).collect();
         let more = all.len().saturating_sub(MOST_NAMES);
         let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("not imported because {why}: {}{rest}", names.join(", "))

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use matterix_emit::robots::{ros, urscript};
 use matterix_emit::{Performance, Subject, opentrons, steps};
 use matterix_ir::script::Wiring;
-use matterix_ir::{Diagnostic, Program, Sources};
+use matterix_ir::{Diagnostic, Program, Severity, Sources, codes};
 use matterix_runtime::exec::{Limits, RunStatus};
 use matterix_runtime::run::{Fidelity, RunOptions};
 
@@ -62,6 +62,8 @@ pub fn emit(
     let mut performance = Performance::new(subject);
     let outcome = matterix_runtime::run::run(program, &options, &mut performance);
     let mut found = super::run::findings(&outcome, sources);
+    // What is left on at the end is `check`'s to warn of: a protocol may leave a block cold for whoever comes.
+    found.iter_mut().filter(|d| d.code == codes::UNFINISHED).for_each(|d| d.severity = Severity::Warning);
     // What was performed until then is no protocol.
     if outcome.status == RunStatus::Cancelled || found.iter().any(Diagnostic::is_error) {
         return (None, found);

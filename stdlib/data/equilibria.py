@@ -27,7 +27,7 @@ R_LN10 = 8.314462618 * math.log(10)
 T0 = 298.15
 # Atomic masses of what solubilities are given of, g/mol (IUPAC, 2021, abridged).
 MASSES = {
-    "H": 1.008, "C": 12.011, "N": 14.007, "O": 15.999, "Na": 22.990, "Mg": 24.305, "P": 30.974, "S": 32.06, "Cl": 35.45, "K": 39.098,
+    "H": 1.008, "B": 10.81, "C": 12.011, "N": 14.007, "O": 15.999, "Na": 22.990, "Mg": 24.305, "P": 30.974, "S": 32.06, "Cl": 35.45, "K": 39.098,
     "Fe": 55.845, "Cu": 63.546, "Zn": 65.38, "Br": 79.904, "I": 126.904, "Ba": 137.327, "Pb": 207.2,
 }
 # How far two sources may be apart.
@@ -110,39 +110,122 @@ def solved(matrix, right):
     return [row[-1] / row[i] for i, row in enumerate(rows)]
 
 
-def saturated(numbers, formula, water, percent, celsius):
-    """log10 K of a salt of which a saturated solution holds this much, with the activities of `davies` in stdlib/chemistry.mtx."""
-    known = formulas()
-    anhydrous = mass(formula)
-    molality = percent / (100 - percent) / anhydrous * 1e3
+def davies(molality_of, charges, celsius):
+    """What charge and ionic strength take off log10 of an activity, per charge squared, and the ionic strength up to which that goes."""
+    strength = min(0.5 * sum(count * charges[name] ** 2 for name, count in molality_of.items()), 1)
     rise = celsius - 25
-    # sqrt(I) / (1 + sqrt(I)) - 0.3 I, up to an ionic strength of 1 mol/kg.
-    ions = {name: count for name, count in numbers.items() if name != "water" and count > 0}
-    charges = {name: elements(known[name])["charge"] for name in ions}
-    strength = min(0.5 * molality * sum(count * charges[name] ** 2 for name, count in ions.items()), 1)
-    bracket = math.sqrt(strength) / (1 + math.sqrt(strength)) - 0.3 * strength
     slope = 0.51 + 8.74e-4 * rise + 4.34e-6 * rise**2
-    total = sum(count * (math.log10(count * molality) - slope * charges[name] ** 2 * bracket) for name, count in ions.items())
-    return total - water * 0.017 * molality * sum(ions.values()) / math.log(10)
+    return slope * (math.sqrt(strength) / (1 + math.sqrt(strength)) - 0.3 * strength), strength
+
+
+@functools.cache
+def acid_steps():
+    """For each acid the base that it becomes by giving off H+, and the row of that."""
+    found = {}
+    for row in table("equilibria.csv"):
+        if row["kind"] == "pka":
+            numbers = sides(row["equation"])
+            acid = next(name for name, count in numbers.items() if count < 0 and name != "water")
+            base = next(name for name, count in numbers.items() if count > 0 and name != "H+")
+            found.setdefault(acid, (base, row))
+    return found
+
+
+def log_acid_constant(row, celsius):
+    """log10 of an acidity constant at a temperature."""
+    kelvin = celsius + 273.15
+    if row["analytic"] or row["capacity"]:
+        a = [float(x) for x in row["analytic"].split()] if row["analytic"] else analytic(row)
+        a += [0] * (6 - len(a))
+        return a[0] + a[1] * kelvin + a[2] / kelvin + a[3] * math.log10(kelvin) + a[4] / kelvin**2 + a[5] * kelvin**2
+    return -float(row["value"]) - float(row["enthalpy"] or 0) * 1e3 / R_LN10 * (1 / kelvin - 1 / T0)
+
+
+def settled(dissolved, known, celsius):
+    """Molalities at equilibrium where acids and bases of one acid are dissolved, with ions that are neither; without OH-."""
+    charges = {name: elements(known[name])["charge"] for name in [*dissolved, "H+"]}
+    bases = {base: acid for acid, (base, _) in acid_steps().items()}
+    forms = [next((name for name in dissolved if name in acid_steps() or name in bases), None)]
+    while forms[0] in bases:
+        forms.insert(0, bases[forms[0]])
+    while forms[-1] in acid_steps():
+        forms.append(acid_steps()[forms[-1]][0])
+    if forms == [None]:
+        return dict(dissolved), charges
+    charges |= {name: elements(known[name])["charge"] for name in forms}
+    total = sum(dissolved.get(name, 0) for name in forms)
+    others = {name: count for name, count in dissolved.items() if name not in forms}
+    strength, found = 0, {}
+    for _ in range(100):
+        # Shares at an activity of H+, with activity coefficients of the last round.
+        low, high = -14.0, 1.0
+        for _ in range(80):
+            middle = (low + high) / 2
+            off, _ = davies(found, charges, celsius) if found else (0, 0)
+            logs = [0.0]
+            for acid in forms[:-1]:
+                base, row = acid_steps()[acid]
+                logs.append(logs[-1] + log_acid_constant(row, celsius) - middle + off * (charges[base] ** 2 - charges[acid] ** 2))
+            most = max(logs)
+            shares = [10 ** (x - most) for x in logs]
+            found_now = {name: total * share / sum(shares) for name, share in zip(forms, shares)}
+            found_now["H+"] = 10 ** (middle + off)
+            balance = sum(count * charges[name] for name, count in (found_now | others).items())
+            low, high = (low, middle) if balance > 0 else (middle, high)
+        found = found_now | others
+        before, strength = strength, davies(found, charges, celsius)[1]
+        if abs(strength - before) < 1e-12:
+            break
+    return found, charges
+
+
+def saturated(numbers, formula, percent, celsius, alone):
+    """log10 K of a solid of which a saturated solution holds this much, with the activities of `davies` in stdlib/chemistry.mtx; of one that
+    stands `alone` no acid or base splits."""
+    known = formulas()
+    molality = percent / (100 - percent) / mass(formula) * 1e3
+    water = numbers.get("water", 0)
+    products = {name: count for name, count in numbers.items() if name != "water" and count > 0}
+    dissolved = {name: count * molality for name, count in products.items()}
+    found, charges = (dissolved, {name: elements(known[name])["charge"] for name in products}) if alone else settled(dissolved, known, celsius)
+    off, strength = davies(found, charges, celsius)
+    total = sum(count * (math.log10(found[name]) - (off * charges[name] ** 2 if charges[name] else -0.1 * strength)) for name, count in products.items())
+    return total - water * 0.017 * sum(found.values()) / math.log(10)
+
+
+def solid_of(row):
+    """The solid of an equation, and the solubilities known of it."""
+    numbers = sides(row["equation"])
+    solid = next(name for name, count in numbers.items() if count < 0)
+    return solid, numbers, [point for point in table("solubilities.csv") if point["salt"] == solid]
 
 
 def crystallising(row):
-    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a salt, by least squares; how far off; their sources."""
-    numbers = sides(row["equation"])
-    salt = next(name for name, count in numbers.items() if count < 0)
-    points = [point for point in table("solubilities.csv") if point["salt"] == salt]
+    """Numbers of log10 K = A1 + A3 / T + A4 log10 T that give the solubilities of a solid, by least squares; how far off; their sources. With
+    two of them A4 is 0."""
+    _, numbers, points = solid_of(row)
     basis, logs = [], []
     for point in points:
         celsius = float(point["temperature"])
         kelvin = celsius + 273.15
         basis.append([1, 1e3 / kelvin, math.log10(kelvin / T0)])
-        logs.append(saturated(numbers, point["formula"], numbers.get("water", 0), float(point["mass_percent"]), celsius))
+        logs.append(saturated(numbers, point["formula"], float(point["mass_percent"]), celsius, row["module"] == "crystals"))
     matrix = [[sum(b[i] * b[k] for b in basis) for k in range(3)] for i in range(3)]
-    a, b, c = solved(matrix, [sum(row_[i] * value for row_, value in zip(basis, logs)) for i in range(3)])
+    right = [sum(row_[i] * value for row_, value in zip(basis, logs)) for i in range(3)]
+    if len(points) == 2:
+        matrix[2], right[2] = [0, 0, 1], 0
+    a, b, c = solved(matrix, right)
     worst = max(abs(sum(x * y for x, y in zip((a, b, c), row_)) - value) for row_, value in zip(basis, logs))
     order = sum(count for name, count in numbers.items() if count > 0 and name != "water")
     names = sorted({point["source"] for point in points})
     return [round(a - c * math.log10(T0), 5), 0, round(1e3 * b, 3), round(c, 5)], 100 * (10 ** (worst / order) - 1), names
+
+
+def dissolving(row):
+    """log10 K of a solid of which one solubility is known, near 25 degC, and its source."""
+    _, numbers, (point,) = solid_of(row)
+    value = saturated(numbers, point["formula"], float(point["mass_percent"]), float(point["temperature"]), False)
+    return round(value, 4), point["source"]
 
 
 def mass(formula):
@@ -198,12 +281,12 @@ def species(row):
 @functools.cache
 def heats():
     """Heats of solution, as they are written."""
-    found = {}
-    for path in (LIBRARY / "species.mtx", LIBRARY / "salts.mtx"):
-        for name, body in re.findall(r"^species (\S+) \{\n(.*?)^\}", path.read_text(encoding="utf8"), re.M | re.S):
-            heat = re.search(r"^    heat_of_solution: (.*? kJ/mol)", body, re.M)
-            if heat:
-                found[name] = heat.group(1)
+    text = (LIBRARY / "species.mtx").read_text(encoding="utf8")
+    found = {row["name"]: f"{row['heat_of_solution']} kJ/mol" for row in table("species.csv") if row["heat_of_solution"]}
+    for name, body in re.findall(r"^species (\S+) \{\n(.*?)^\}", text, re.M | re.S):
+        heat = re.search(r"^    heat_of_solution: (.*? kJ/mol)", body, re.M)
+        if heat:
+            found[name] = heat.group(1)
     return found
 
 
@@ -215,11 +298,15 @@ def equilibrium(row):
     if row["analytic"]:
         constant = "analytic: [" + ", ".join(number(x) for x in row["analytic"].split()) + "]"
         sources = tag(row["source"])
+    elif row["kind"] == "solubility" and len(solid_of(row)[2]) == 1:
+        value, source = dissolving(row)
+        constant = f"log_constant: {number(value)}" + (f", enthalpy: {number(row['enthalpy'])} kJ/mol" if row["enthalpy"] else "")
+        sources = tag(source, row["enthalpy_source"])
     elif row["kind"] == "solubility":
         numbers, worst, names = crystallising(row)
         constant = "analytic: [" + ", ".join(number(x) for x in numbers) + "]"
         sources = tag(*names)
-        heat = heats().get(row["equation"].split(" <->")[0])
+        heat = heats().get(row["equation"].split(" <->")[0].removesuffix("(s)"))
         more = [f"    heat: {heat}"] if heat else []
         said = [f"    // met within {max(worst, 0.1):.1f} %"]
     elif row["capacity"] and row["kind"] == "pka":
@@ -335,6 +422,9 @@ def section(entry, all_species, all_equilibria, all_interactions):
     lines += ["| equilibrium | constant at 25 °C | enthalpy, kJ/mol | source |", "| --- | --- | --- | --- |"]
     words = {"pka": "pKa", "pksp": "pKsp", "log_constant": "log10 K"}
     for row in rules:
+        if row["kind"] == "solubility":
+            lines.append(f"| `{row['name']}` | of the solubility | {row['enthalpy']} | {', '.join(sorted({p['source'] for p in solid_of(row)[2]}))} |")
+            continue
         moves = ", analytic" if row["analytic"] or row["capacity"] else ""
         lines.append(f"| `{row['name']}` | {words[row['kind']]} {number(row['value'])}{moves} | {row['enthalpy']} | {row['source']} |")
     return "\n".join(lines + [""])

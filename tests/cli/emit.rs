@@ -210,8 +210,8 @@ fn what_the_text_decides_is_no_branch() {
 
 /// A plate whose definition does not come with Opentrons' software.
 pub fn own_plate() -> String {
-    let text = fs::read_to_string(root().join("assets/labware/corning_96_wellplate_360ul_flat.json")).expect("read");
-    let mut definition: Value = serde_json::from_str(&text).expect("JSON");
+    let printed = matterixc(&["labware", "corning_96_wellplate_360ul_flat/2", "--format", "definition"]);
+    let mut definition: Value = serde_json::from_str(&printed.out).expect("JSON");
     definition["namespace"] = "house".into();
     definition["parameters"]["loadName"] = "flat_96".into();
     definition["version"] = 7.into();

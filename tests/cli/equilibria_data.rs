@@ -13,6 +13,11 @@ fn metals_dissolve_precipitate_and_are_bound_as_in_handbooks() {
 }
 
 #[test]
+fn acids_of_which_little_dissolves_come_out_as_solids() {
+    pass_cases("solid_acids.mtx", &["look"]);
+}
+
+#[test]
 fn saltpetre_crystallises_on_cooling_with_its_yield() {
     pass_cases("crystals.mtx", &["recrystallise"]);
 }
@@ -78,4 +83,43 @@ fn crystals_hold_by_the_law_of_davies_only() {
     assert!(other.contains("hold with `activities: davies` only"), "{other}");
     let davies = said_of(&dir, "use std::crystals", "", salt);
     assert!(!davies.contains("hold with `activities: davies` only"), "{davies}");
+}
+
+#[test]
+fn potassium_sulfate_dissolves_by_pitzer_as_the_handbook_has_it() {
+    let dir = folder("equilibria_data_sulfate");
+    // 7.11, 10.7 and 15.5 % by mass at 0, 25 and 60 degC (CRC Handbook, 98th ed.).
+    let cases = [(0, 43.9), (25, 68.8), (60, 105.3)];
+    for (celsius, dissolved) in cases {
+        let text = format!(
+            "mtx 1
+use std::brines
+use std::salts
+use std::glassware::Beaker250mL
+asset Brine: Beaker250mL {{ contents: {{ activities: pitzer }} }}
+lab bench {{
+    ambient: 25 degC
+    cup = Brine at (0, 0, 0) m holding 100 g of water + 30 g of potassium_sulfate at {celsius} degC
+}}
+workflow look in bench {{
+    wait 1 ms
+    expect cup.contents.amount[SO4^2-] in {} mmol .. {} mmol
+}}
+",
+            0.98 * dissolved,
+            1.02 * dissolved
+        );
+        write(&dir, "brine.mtx", text);
+        let ended = matterixc_in(&dir, &["run", "brine.mtx"]);
+        assert!(ended.code == 0, "{celsius}: {}{}", ended.out, ended.err);
+    }
+}
+
+#[test]
+fn an_equilibrium_without_a_constant_is_told_by_its_species() {
+    let dir = folder("equilibria_data_range");
+    let said = said_of(&dir, "use std::acids", "", "100 g of water + 1 mmol of aspirin at 90 degC");
+    assert!(said.contains("an equilibrium of aspirin has no constant"), "{said}");
+    let water = said_of(&dir, "use std::equilibria", "", "100 g of water + 1 mmol of H3PO4 at 25 degC");
+    assert!(!water.contains("has no constant"), "{water}");
 }

@@ -193,7 +193,7 @@ fn definitions_of_labware_become_assets() {
     write(&dir, "plates/rack.json", RACK);
     let text = "mtx 1
 asset Rack from labware \"plates/rack.json\"
-asset Other: Reservoir from labware \"nest_12_reservoir_15ml.json\" { mass: 60 g }
+asset Other: Reservoir from labware \"nest_12_reservoir_15ml\" { mass: 60 g }
 lab l { ambient: 22 degC, r = Rack at (0, 0, 0) m holding { A1 .. B2: 1 mL of water }, o = Other at (1, 0, 0) m }
 workflow w in l {
     expect r.wells.count == 4 and r[B2].max_volume == 9 mL and r[A2].max_volume == 1.5 mL

@@ -32,6 +32,7 @@ mod hidden;
 mod hollow;
 mod interactions;
 mod joints;
+mod labware;
 mod laws;
 mod layers;
 mod lsp;

@@ -73,9 +73,9 @@ fn grave_pairs_are_errors_where_they_meet() {
         ("cyanide", "50 g of water + 0.5 g of NaCN", "20 g of water + 1 g of acetic_acid"),
         ("sulfide", "50 g of water + 0.5 g of Na2S", "20 g of water + 0.1 g of HCl"),
         ("peroxide", "50 g of acetone", "14 g of water + 6 g of H2O2"),
-        ("permanganate", "50 g of EtOH", "5 g of KMnO4 + 1 g of water"),
+        ("permanganate", "50 g of EtOH", "6 g of KMnO4"),
         ("sodium", "50 g of water", "10 g of Na"),
-        ("borohydride", "50 g of water + 2 g of HCl", "10 g of water + 1 g of NaBH4"),
+        ("borohydride", "50 g of water + 2 g of HCl", "10 g of water + 1 g of NaBH4 + 0.5 g of NaOH"),
         ("chloride", "50 g of water", "10 g of acetyl_chloride"),
         ("amine", "50 g of aniline", "10 g of water + 10 g of HNO3"),
     ] {

@@ -375,3 +375,112 @@ workflow look in bench { expect cup.contents.volume < 110 mL }\n";
     assert!(said(acetone.into()).contains("sum of those of water and acetone"));
     assert!(said(acetone.replace("acetone", "EtOH")).contains("no findings"));
 }
+
+/// What a check says of a cup that stands, with a note of what it is asked.
+fn standing(dir: &std::path::Path, uses: &str, holding: &str, asked: &str) -> String {
+    let text = format!(
+        "mtx 1
+{uses}
+use std::glassware::Beaker250mL
+extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 ms
+    effect move(m, from: source, to: target)
+lab bench {{
+    ambient: 25 degC
+    cup = Beaker250mL at (1, 0, 0) m holding {holding}
+    water = Beaker250mL at (2, 0, 0) m holding 100 g of water
+}}
+workflow look in bench {{
+    weigh_out 1 g from water into water
+    {asked}
+}}
+"
+    );
+    write(dir, "cup.mtx", text);
+    flat(&matterixc_in(dir, &["check", "cup.mtx", "--no-cache"]).out)
+}
+
+#[test]
+fn what_is_not_known_to_dissolve_is_told() {
+    let dir = folder("not_known_to_dissolve");
+    let unknown = "in water is not in the library";
+    let beyond = "than dissolves";
+    let cases = [
+        ("use std::substances::maltose", "100 g of water + 10 g of maltose", unknown),
+        ("use std::substances::maltose", "100 g of water + 2 g of maltose", ""),
+        // In another solvent the library never says what dissolves.
+        ("use std::substances::maltose", "100 g of EtOH + 10 g of maltose", ""),
+        ("use std::acids", "100 g of water + 10 g of sodium_benzoate", unknown),
+        ("use std::salts", "100 g of water + 10 g of magnesium_nitrate_hexahydrate", ""),
+        ("use std::salts", "50 g of water + 200 g of magnesium_nitrate_hexahydrate", beyond),
+        ("use std::salts", "100 g of water + 10 g of calcium_chloride_dihydrate", ""),
+        ("use std::substances::anthraquinone", "100 g of water + 1 g of anthraquinone", beyond),
+        ("", "100 g of water + 1 g of I2", beyond),
+        ("", "100 g of water + 1 g of I2 + 5 g of KI", ""),
+        ("", "100 g of water + 20 g of H3PO4", ""),
+    ];
+    for (uses, holding, why) in cases {
+        let said = standing(&dir, uses, holding, "expect cup.contents.mass > 0 g");
+        let told = said.contains(unknown) || said.contains(beyond);
+        assert!(told != why.is_empty() && said.contains(why), "{holding}: {said}");
+    }
+}
+
+#[test]
+fn solids_in_other_liquids_are_told() {
+    let dir = folder("solids_in_other_liquids");
+    let asked = "expect cup.contents.mass > 0 g";
+    let mixed = standing(&dir, "use std::acids", "60 g of water + 40 g of EtOH + 5 g of benzoic_acid", asked);
+    assert!(mixed.contains("follows constants in water, and"), "{mixed}");
+    let water = standing(&dir, "use std::acids", "60 g of water + 5 g of benzoic_acid", asked);
+    assert!(!water.contains("follows constants in water, and"), "{water}");
+}
+
+#[test]
+fn heats_of_mixing_that_are_not_known_are_told() {
+    let dir = folder("heats_of_mixing");
+    let asked = "weigh_out 50 g from cup into water\n    expect water.contents.temperature > 20 degC";
+    let mixing = "leaves out the heat of mixing";
+    for (holding, why) in [
+        ("60 g of EtOH", "leaves out the heat of mixing EtOH with water"),
+        ("60 g of DMSO", "leaves out the heat of mixing DMSO with water"),
+        ("60 g of toluene", ""),
+        ("60 g of water", ""),
+    ] {
+        let said = standing(&dir, "", holding, asked);
+        assert!(said.contains(why) && said.contains(mixing) != why.is_empty(), "{holding}: {said}");
+    }
+    // The enthalpies of formation have 16.6 kJ/mol for the liquid, and a mole of water takes half of that.
+    let acid = standing(&dir, "", "51 g of H3PO4 + 9 g of water", asked);
+    assert!(acid.contains("ignores a change of about 6 K"), "{acid}");
+}
+
+#[test]
+fn what_does_not_last_or_split_in_water_is_told() {
+    let dir = folder("does_not_last");
+    let asked = "expect acidity(cup.contents) < 15";
+    let acid = standing(&dir, "", "100 g of water + 1 mmol of HI", asked);
+    assert!(acid.contains("ignores the strong acid HI"), "{acid}");
+    let split = standing(&dir, "use std::equilibria", "100 g of water + 1 mmol of HI", asked);
+    assert!(!split.contains("ignores the strong acid HI"), "{split}");
+    let reducer = standing(&dir, "", "100 g of water + 1 g of NaBH4", "expect cup.contents.mass > 0 g");
+    assert!(reducer.contains("borohydride in water that is not strongly basic"), "{reducer}");
+    let lye = standing(&dir, "", "100 g of water + 1 g of NaBH4 + 4 g of NaOH", "expect cup.contents.mass > 0 g");
+    assert!(!lye.contains("borohydride in water"), "{lye}");
+}
+
+#[test]
+fn conductivities_of_ions_that_pair_are_told() {
+    let dir = folder("ions_pair");
+    let uses = "use std::electrodes::conductivity";
+    let asked = "expect conductivity(cup.contents) > 0 S/m";
+    for (uses, holding, told) in [
+        (uses.to_owned(), "100 g of water + 1 mmol of CuSO4", true),
+        (format!("{uses}\nuse std::complexes"), "100 g of water + 1 mmol of CuSO4", false),
+        (uses.to_owned(), "100 g of water + 10 umol of CuSO4", false),
+        (uses.to_owned(), "100 g of water + 1 mmol of KCl", false),
+    ] {
+        let said = standing(&dir, &uses, holding, asked);
+        assert!(said.contains("of two negative charges pair") == told, "{uses}, {holding}: {said}");
+    }
+}

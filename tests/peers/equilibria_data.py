@@ -39,8 +39,13 @@ REAGENTS = [
 
 def log_k(row, kelvin):
     """log10 of the constant of an equation at a temperature, as the library reckons it."""
-    if row["analytic"] or row["capacity"]:
-        a = [float(x) for x in row["analytic"].split()] if row["analytic"] else data.analytic(row)
+    if row["kind"] == "solubility" and len(data.solid_of(row)[2]) == 1:
+        return data.dissolving(row)[0] - float(row["enthalpy"] or 0) * 1e3 / data.R_LN10 * (1 / kelvin - 1 / data.T0)
+    if row["analytic"] or row["capacity"] or row["kind"] == "solubility":
+        if row["analytic"]:
+            a = [float(x) for x in row["analytic"].split()]
+        else:
+            a = data.crystallising(row)[0] if row["kind"] == "solubility" else data.analytic(row)
         a = a + [0.0] * (6 - len(a))
         return a[0] + a[1] * kelvin + a[2] / kelvin + a[3] * math.log10(kelvin) + a[4] / kelvin**2 + a[5] * kelvin**2
     sign = -1 if row["kind"] in ("pka", "pksp") else 1
@@ -50,7 +55,7 @@ def log_k(row, kelvin):
 
 def is_solid(row):
     """Whether an equilibrium is that of a pure solid."""
-    return row["kind"] == "pksp" or "(s)" in row["equation"]
+    return row["kind"] in ("pksp", "solubility") or "(s)" in row["equation"]
 
 
 class Database:

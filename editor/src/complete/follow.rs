@@ -8,7 +8,8 @@ use super::{Offers, steps};
 const BEFORE_VALUES: &[&str] = &[
     "and", "or", "not", "is", "of", "until", "while", "if", "expect", "hold", "keep", "keeps", "ends", "repeat",
     "within", "for", "timeout", "every", "after", "max", "record", "claim", "return", "await", "start", "step", "let",
-    "wait", "note", "ask", "fail", "retry", "when", "needs", "presumes", "else", "try", "times", "run", "include",
+    "wait", "note", "ask", "fail", "retry", "when", "needs", "presumes", "warns", "else", "try", "times", "run",
+    "include",
 ];
 
 /// How conditions go on.

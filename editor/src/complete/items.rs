@@ -73,12 +73,12 @@ const LINES: &[(&str, &str)] = &[
 ];
 
 /// Fields of geometry that every asset may have.
-const GEOMETRY: &[&str] = &["shape", "room", "mesh", "collision", "inertia"];
+const GEOMETRY: &[&str] = &["shape", "room", "inside", "mesh", "collision", "inertia"];
 
 /// Clauses of a skill or command.
 const CLAUSES: &[&str] = &[
-    "needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips", "frees",
-    "leads",
+    "needs", "presumes", "warns", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips",
+    "frees", "leads",
 ];
 
 /// Lines of a study or a fit.

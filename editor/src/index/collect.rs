@@ -150,7 +150,9 @@ impl Index {
             match &clause.kind {
                 ClauseKind::Option(p) => self.params(id, std::slice::from_ref(p), Kind::Option),
                 ClauseKind::Fails(names) => names.iter().for_each(|n| self.failure_here(n, clause.span)),
-                ClauseKind::Needs { refusal, .. } | ClauseKind::Presumes { refusal, .. } => {
+                ClauseKind::Needs { refusal, .. }
+                | ClauseKind::Presumes { refusal, .. }
+                | ClauseKind::Warns { refusal, .. } => {
                     self.refusal(refusal.as_ref(), clause.span);
                 }
                 _ => {}

@@ -6,6 +6,9 @@ use matterix_ir::scene::{InstanceId, Scene};
 
 use super::form::About;
 
+/// How commands call the fixed bin.
+pub(super) const BIN: &str = "fixedTrash";
+
 /// Something that has been loaded.
 #[derive(Clone, Debug)]
 pub(super) struct Loaded {
@@ -22,6 +25,8 @@ pub(super) enum Location {
     Slot(String),
     /// A module, by its identifier.
     Module(String),
+    /// Other labware, such as an adapter, by its identifier.
+    Labware(String),
 }
 
 /// Words of Python, and names that a protocol in Python has for itself.
@@ -98,11 +103,12 @@ impl<'p> Deck<'p> {
         id
     }
 
-    /// Where what stands on this thing stands; none where that is neither a place of this deck nor a module on it.
+    /// Where what stands on this thing stands; none where that is neither a place of this deck nor a module or labware on it.
     pub(super) fn location(&self, name: &str) -> Option<Location> {
         let support = self.scene.find(name)?;
         match self.loaded.get(&support) {
             Some(Loaded { id, about: About::Module }) => return Some(Location::Module(id.clone())),
+            Some(Loaded { id, about: About::Labware }) => return Some(Location::Labware(id.clone())),
             Some(_) => return None,
             None => {}
         }
@@ -112,6 +118,11 @@ impl<'p> Deck<'p> {
     /// The identifier of the labware that a well or tip belongs to, and its name in it.
     pub(super) fn well(&self, id: InstanceId) -> Option<(String, String)> {
         let instance = self.scene.get(id);
+        let whole = instance.owner?;
+        // The bin is a part of the robot, which nothing loads.
+        if !self.loaded.contains_key(&whole) && self.scene.get(whole).owner == Some(self.robot) {
+            return Some((BIN.to_owned(), label(&instance.name).to_owned()));
+        }
         let labware = self.loaded.get(&instance.owner?).filter(|l| l.about == About::Labware)?;
         Some((labware.id.clone(), label(&instance.name).to_owned()))
     }

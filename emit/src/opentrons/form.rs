@@ -4,6 +4,8 @@
 /// What a command is about; its identifier is put in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum About {
+    /// The robot itself, which has no identifier.
+    Robot,
     /// The pipette that gets the command.
     Pipette,
     /// The plate, rack or reservoir.
@@ -21,14 +23,20 @@ pub(super) enum Holds {
     Text,
     /// A number.
     Number,
+    /// A number that is left out where it is 0.
+    Given,
+    /// The mount whose axis and plunger go home.
+    Mount,
+    /// The mount whose plunger goes home.
+    Plunger,
     /// `true` or `false`.
     Flag,
     /// A place of loaded labware, or those of all channels.
     Well,
     /// Where in a well: `top`, `bottom`, `center`.
     Origin,
-    /// Above that, mm.
-    Height,
+    /// How far from that along an axis, mm.
+    Offset,
     /// What a thing stands on: a place of the deck, or a module.
     Location,
     /// A labware definition by `NAMESPACE/NAME/VERSION`.
@@ -56,7 +64,8 @@ impl Form {
 }
 
 /// Where a pipette does something in a well.
-const SPOT: &[(&str, Holds)] = &[("origin", Holds::Origin), ("z", Holds::Height)];
+const SPOT: &[(&str, Holds)] =
+    &[("origin", Holds::Origin), ("x", Holds::Offset), ("y", Holds::Offset), ("z", Holds::Offset)];
 
 const fn form(
     name: &'static str,
@@ -83,8 +92,30 @@ const FORMS: &[Form] = &[
         "touchTip",
         About::Pipette,
         &[("well", Well)],
-        &[("origin", Holds::Origin), ("z", Holds::Height), ("radius", Number), ("speed", Number)],
+        &[
+            ("origin", Holds::Origin),
+            ("x", Holds::Offset),
+            ("y", Holds::Offset),
+            ("z", Holds::Offset),
+            ("radius", Number),
+            ("speed", Number),
+        ],
     ),
+    form(
+        "moveToWell",
+        About::Pipette,
+        &[("well", Well)],
+        &[
+            ("origin", Holds::Origin),
+            ("x", Holds::Offset),
+            ("y", Holds::Offset),
+            ("z", Holds::Offset),
+            ("forceDirect", Flag),
+            ("speed", Holds::Given),
+            ("minimumZHeight", Holds::Given),
+        ],
+    ),
+    form("aspirateInPlace", About::Pipette, &[("volume", Number), ("flowRate", Number)], &[]),
     form("dropTip", About::Pipette, &[("well", Well)], &[("alternateDropLocation", Flag)]),
     form(
         "moveToAddressableAreaForDropTip",
@@ -93,7 +124,24 @@ const FORMS: &[Form] = &[
         &[("alternateDropLocation", Flag)],
     ),
     form("dropTipInPlace", About::Pipette, &[], &[]),
+    form("setTipState", About::Labware, &[], &[]),
+    form("home", About::Robot, &[], &[("mount", Holds::Mount), ("plunger", Holds::Plunger)]),
+    form("thermocycler/openLid", About::Module, &[], &[]),
+    form("thermocycler/closeLid", About::Module, &[], &[]),
+    form("thermocycler/setTargetBlockTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("thermocycler/waitForBlockTemperature", About::Module, &[], &[]),
+    form("thermocycler/deactivateBlock", About::Module, &[], &[]),
+    form("thermocycler/setTargetLidTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("thermocycler/waitForLidTemperature", About::Module, &[], &[]),
+    form("thermocycler/deactivateLid", About::Module, &[], &[]),
+    form("setRailLights", About::Robot, &[("on", Flag)], &[]),
+    form("temperatureModule/setTargetTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("temperatureModule/waitForTemperature", About::Module, &[], &[]),
+    form("temperatureModule/deactivate", About::Module, &[], &[]),
+    form("magneticModule/engage", About::Module, &[("height", Number)], &[]),
+    form("magneticModule/disengage", About::Module, &[], &[]),
     form("heaterShaker/setTargetTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("heaterShaker/waitForTemperature", About::Module, &[], &[]),
     form("heaterShaker/deactivateHeater", About::Module, &[], &[]),
     form("heaterShaker/setAndWaitForShakeSpeed", About::Module, &[("rpm", Number)], &[]),
     form("heaterShaker/deactivateShaker", About::Module, &[], &[]),

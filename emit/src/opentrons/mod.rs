@@ -12,7 +12,7 @@ mod writer;
 use matterix_ir::Diagnostic;
 
 use crate::course::{self, Means};
-use crate::finding::settle;
+use crate::finding::{not_expressible, settle};
 use crate::performance::Performance;
 use crate::{Subject, Written};
 use protocol::Protocol;
@@ -26,6 +26,12 @@ const WHAT: &str = "an Opentrons protocol";
 /// A JSON protocol of schema 8, with commands of schema 8.
 pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let (protocol, warnings) = protocol(subject, performance)?;
+    let beyond = |c: &&protocol::Command| c.name == "setTipState" || c.text("labwareId") == deck::BIN;
+    if let Some(command) = protocol.commands.iter().find(beyond) {
+        let headline = format!("{WHAT} in JSON neither refills a rack nor dispenses into the bin");
+        let d = not_expressible(command.at, headline, "is told this").help("write it as `--target opentrons-python`");
+        return Err(vec![d]);
+    }
     Ok((json::write(&protocol), warnings))
 }
 

@@ -1,5 +1,7 @@
 //! A performance as commands of the run engine.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::script::Wired;
@@ -42,6 +44,8 @@ pub(super) struct Protocol<'p> {
     pub(super) liquids: Vec<(String, String)>,
     /// Labware definitions that Opentrons does not know by itself, by `NAMESPACE/NAME/VERSION`.
     pub(super) definitions: Vec<(String, Value)>,
+    /// Those of the labware used whose role is to bear other labware, which Python loads by a call of its own.
+    pub(super) adapters: BTreeSet<String>,
     /// What is loaded.
     pub(super) loads: Vec<Command>,
     /// What is done.
@@ -64,6 +68,7 @@ impl<'p> Protocol<'p> {
                 robot,
                 liquids: Vec::new(),
                 definitions: Vec::new(),
+                adapters: BTreeSet::new(),
                 loads: Vec::new(),
                 commands: Vec::new(),
             },

@@ -7,6 +7,7 @@ use matterix_ir::{Diagnostic, Span};
 use serde_json::Value;
 
 use super::WHAT;
+use super::deck::BIN;
 use super::protocol::{Command, Protocol};
 use crate::finding::not_expressible;
 use crate::place;
@@ -22,11 +23,21 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
         }
     }
     let mut said: Option<Span> = None;
-    for command in &protocol.commands {
+    let mut commands = protocol.commands.iter().peekable();
+    while let Some(command) = commands.next() {
         if said != Some(command.at) {
             said = Some(command.at);
             let (file, line, text) = place::line(protocol.subject.sources, command.at);
             script.line(&format!("# {file}:{line}: {text}"));
+        }
+        // One call brings a module to a temperature and waits for it.
+        if let Some((_, wait, call)) = TEMPERED.iter().find(|(set, ..)| *set == command.name) {
+            let waits = |next: &&Command| next.name == *wait && next.text("moduleId") == command.text("moduleId");
+            if commands.next_if(waits).is_some() {
+                let celsius = shown(command.params.get("celsius"));
+                script.line(&format!("{}.{call}({celsius})", command.text("moduleId")));
+                continue;
+            }
         }
         if !script.call(command) {
             found.push(no_call(command));
@@ -34,6 +45,13 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
     }
     if found.is_empty() { Ok(script.text.into_bytes()) } else { Err(found) }
 }
+
+/// A set point, the wait that follows, and the call that is both.
+const TEMPERED: [(&str, &str, &str); 3] = [
+    ("temperatureModule/setTargetTemperature", "temperatureModule/waitForTemperature", "set_temperature"),
+    ("thermocycler/setTargetBlockTemperature", "thermocycler/waitForBlockTemperature", "set_block_temperature"),
+    ("thermocycler/setTargetLidTemperature", "thermocycler/waitForLidTemperature", "set_lid_temperature"),
+];
 
 fn no_call(command: &Command) -> Diagnostic {
     not_expressible(command.at, format!("{WHAT} in Python has no call for `{}`", command.name), "this step sends it")
@@ -73,6 +91,13 @@ impl Script {
         if !protocol.definitions.is_empty() {
             self.text.push_str("import json\n\n");
         }
+        let is_aside = |c: &Command| {
+            let offset = |axis: &str| c.params.get("wellLocation").and_then(|l| l["offset"][axis].as_f64());
+            ["x", "y"].iter().any(|axis| offset(axis).is_some_and(|off| off != 0.0))
+        };
+        if protocol.commands.iter().any(is_aside) {
+            self.text.push_str("from opentrons.types import Point\n\n");
+        }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
         let _ = writeln!(
             self.text,
@@ -110,18 +135,22 @@ impl Script {
             "loadLabware" => {
                 let (id, version) = (text("labwareId"), shown(command.params.get("version")));
                 let uri = format!("{}/{}/{version}", text("namespace"), text("loadName"));
-                let on = location["moduleId"].as_str().unwrap_or("protocol");
+                let below = location["moduleId"].as_str().or_else(|| location["labwareId"].as_str());
+                let on = below.unwrap_or("protocol");
                 let slot = slot(&location).map(|s| format!(", {s}")).unwrap_or_default();
                 let label = quoted(text("displayName"));
+                // An adapter takes no label.
+                let (kind, label) = match protocol.adapters.contains(&uri) {
+                    true => ("adapter", String::new()),
+                    false => ("labware", format!(", label={label}")),
+                };
                 if protocol.definitions.iter().any(|(known, _)| *known == uri) {
                     let uri = quoted(&uri);
-                    self.line(&format!(
-                        "{id} = {on}.load_labware_from_definition(DEFINITIONS[{uri}]{slot}, label={label})"
-                    ));
+                    self.line(&format!("{id} = {on}.load_{kind}_from_definition(DEFINITIONS[{uri}]{slot}{label})"));
                 } else {
                     let (name, space) = (quoted(text("loadName")), quoted(text("namespace")));
                     self.line(&format!(
-                        "{id} = {on}.load_labware({name}{slot}, label={label}, namespace={space}, version={version})"
+                        "{id} = {on}.load_{kind}({name}{slot}{label}, namespace={space}, version={version})"
                     ));
                 }
             }
@@ -144,6 +173,7 @@ impl Script {
         let (pipette, module) = (text("pipetteId"), text("moduleId"));
         let well = format!("{}[{}]", text("labwareId"), quoted(text("wellName")));
         let spot = spot(command, &well);
+        let offset = |axis: &str| shown(command.params.get("wellLocation").map(|location| &location["offset"][axis]));
         let aimed = self.aimed.take();
         match command.name {
             "pickUpTip" => self.line(&format!("{pipette}.pick_up_tip({spot})")),
@@ -159,6 +189,50 @@ impl Script {
                 self.rate(command, "blow_out");
                 self.line(&format!("{pipette}.blow_out({spot})"));
             }
+            "aspirateInPlace" => {
+                self.rate(command, "aspirate");
+                self.line(&format!("{pipette}.aspirate({})", number("volume")));
+            }
+            "touchTip" if [offset("x"), offset("y")].iter().all(|off| off == "0") => self.line(&format!(
+                "{pipette}.touch_tip({well}, radius={}, v_offset={}, speed={})",
+                number("radius"),
+                offset("z"),
+                number("speed")
+            )),
+            "moveToWell" => {
+                let direct = command.params.get("forceDirect") == Some(&Value::Bool(true));
+                let direct = if direct { ", force_direct=True" } else { "" };
+                let given = |key: &str, name: &str| {
+                    command.params.get(key).map_or(String::new(), |v| format!(", {name}={}", shown(Some(v))))
+                };
+                let (speed, clear) = (given("speed", "speed"), given("minimumZHeight", "minimum_z_height"));
+                self.line(&format!("{pipette}.move_to({spot}{direct}{clear}{speed})"));
+            }
+            "setTipState" => self.line(&format!("{}.reset()", text("labwareId"))),
+            "home" => match command.params.get("axes").and_then(Value::as_array) {
+                None => self.line("protocol.home()"),
+                Some(axes) => {
+                    let axis = axes.first().and_then(Value::as_str).unwrap_or_default();
+                    let call = if axes.len() == 1 { "home_plunger" } else { "home" };
+                    let mount = axis.trim_end_matches("Plunger").trim_end_matches('Z');
+                    self.line(&format!("protocol.loaded_instruments[{}].{call}()", quoted(mount)));
+                }
+            },
+            "thermocycler/openLid" => self.line(&format!("{module}.open_lid()")),
+            "thermocycler/closeLid" => self.line(&format!("{module}.close_lid()")),
+            "thermocycler/deactivateBlock" => self.line(&format!("{module}.deactivate_block()")),
+            "thermocycler/deactivateLid" => self.line(&format!("{module}.deactivate_lid()")),
+            "setRailLights" => {
+                let on = command.params.get("on") == Some(&Value::Bool(true));
+                self.line(&format!("protocol.set_rail_lights({})", if on { "True" } else { "False" }));
+            }
+            "temperatureModule/setTargetTemperature" => {
+                self.line(&format!("{module}.start_set_temperature({})", number("celsius")));
+            }
+            "temperatureModule/deactivate" => self.line(&format!("{module}.deactivate()")),
+            "magneticModule/engage" => self.line(&format!("{module}.engage(height_from_base={})", number("height"))),
+            "magneticModule/disengage" => self.line(&format!("{module}.disengage()")),
+            "heaterShaker/waitForTemperature" => self.line(&format!("{module}.wait_for_temperature()")),
             "dropTip" => self.line(&format!("{pipette}.drop_tip({spot})")),
             "moveToAddressableAreaForDropTip" if text("addressableAreaName") == "fixedTrash" => {
                 self.aimed = Some(pipette.to_owned());
@@ -195,14 +269,17 @@ impl Script {
     }
 }
 
-/// A place in a well.
+/// A place in a well, or the bin.
 fn spot(command: &Command, well: &str) -> String {
+    if command.text("labwareId") == BIN {
+        return "protocol.fixed_trash".to_owned();
+    }
     let Some(location) = command.params.get("wellLocation") else { return well.to_owned() };
-    let z = location["offset"]["z"].as_f64().unwrap_or(0.0);
-    let z = shown(Some(&z.into()));
-    match location["origin"].as_str() {
+    let [x, y, z] = ["x", "y", "z"].map(|axis| shown(Some(&location["offset"][axis].as_f64().unwrap_or(0.0).into())));
+    let place = match location["origin"].as_str() {
         Some("bottom") => format!("{well}.bottom({z})"),
         Some("center") => format!("{well}.center()"),
         _ => format!("{well}.top({z})"),
-    }
+    };
+    if x == "0" && y == "0" { place } else { format!("{place}.move(Point({x}, {y}, 0))") }
 }

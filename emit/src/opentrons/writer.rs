@@ -44,6 +44,7 @@ impl Writer<'_, '_> {
         };
         let (robot, at) = (self.protocol.robot.device, self.protocol.subject.program.scene.get(wired.device).span);
         let here = match message.form.about {
+            About::Robot => true,
             About::Pipette => belongs(self.protocol.subject, wired.device, robot),
             About::Labware | About::Module => message.get("location").is_some_and(|l| self.deck.location(l).is_some()),
             About::Well => self.deck.well(wired.device).is_some() && message.get("volume") != Some("0"),
@@ -94,7 +95,7 @@ impl Writer<'_, '_> {
             };
             return self.found.push(d);
         };
-        if self.deck.get(device).is_none() {
+        if self.deck.get(device).is_none() && device != self.protocol.robot.device {
             let headline =
                 format!("`{}` is not a part of `{}`", self.name(device), self.name(self.protocol.robot.device));
             return self.found.push(not_expressible(at, headline, format!("this step does `{}`", step.label)));
@@ -112,6 +113,7 @@ impl Writer<'_, '_> {
         let mut params = Map::new();
         let own = self.deck.get(device).map(|l| l.id.clone()).unwrap_or_default();
         match message.form.about {
+            About::Robot => {}
             About::Pipette => drop(params.insert("pipetteId".to_owned(), own.into())),
             About::Module => drop(params.insert("moduleId".to_owned(), own.into())),
             About::Labware => drop(params.insert("labwareId".to_owned(), own.into())),
@@ -128,6 +130,16 @@ impl Writer<'_, '_> {
             match holds {
                 Holds::Text => drop(params.insert(key, value.as_str().into())),
                 Holds::Number => drop(params.insert(key, parsed(message, name, value)?.into())),
+                Holds::Mount => {
+                    drop(params.insert("axes".to_owned(), json!([format!("{value}Z"), format!("{value}Plunger")])))
+                }
+                Holds::Plunger => drop(params.insert("axes".to_owned(), json!([format!("{value}Plunger")]))),
+                Holds::Given => {
+                    let value = parsed(message, name, value)?;
+                    if value != 0.0 {
+                        params.insert(key, value.into());
+                    }
+                }
                 Holds::Flag => drop(params.insert(key, flag(message, name, value)?.into())),
                 Holds::Well => {
                     let (labware, well) = self.well(message, value, at)?;
@@ -138,14 +150,17 @@ impl Writer<'_, '_> {
                     drop(spot.insert("origin".to_owned(), value.as_str().into()))
                 }
                 Holds::Origin => return Err(message.wrong(format!("`{value}` is not a position in a well"))),
-                Holds::Height => drop(
-                    spot.insert("offset".to_owned(), json!({ "x": 0, "y": 0, "z": parsed(message, name, value)? })),
-                ),
+                Holds::Offset => {
+                    let offset = spot.entry("offset").or_insert_with(|| json!({ "x": 0, "y": 0, "z": 0 }));
+                    // None is not less than none.
+                    offset[*name] = (parsed(message, name, value)? + 0.0).into();
+                }
                 Holds::Location => drop(params.insert(
                     key,
                     match self.deck.location(value) {
                         Some(Location::Slot(slot)) => json!({ "slotName": slot }),
                         Some(Location::Module(id)) => json!({ "moduleId": id }),
+                        Some(Location::Labware(id)) => json!({ "labwareId": id }),
                         None => Value::Null,
                     },
                 )),
@@ -194,14 +209,18 @@ impl Writer<'_, '_> {
         params.insert("namespace".to_owned(), (*space).into());
         params.insert("version".to_owned(), version.into());
         params.insert("displayName".to_owned(), instance.name.as_str().into());
+        let texts = self.protocol.subject.wiring.files.values().filter(|text| text.contains(name));
+        let found = texts.filter_map(|t| serde_json::from_str::<Value>(t).ok()).find(|d| {
+            let text = |v: &Value| v.as_str().map(str::to_owned);
+            text(&d["namespace"]).as_deref() == Some(space)
+                && text(&d["parameters"]["loadName"]).as_deref() == Some(name)
+                && d["version"].as_u64() == Some(version)
+        });
+        let roles = found.as_ref().and_then(|d| d["allowedRoles"].as_array());
+        if roles.is_some_and(|roles| roles.iter().any(|role| role == "adapter")) {
+            self.protocol.adapters.insert(uri.to_owned());
+        }
         if *space != OWN && !self.protocol.definitions.iter().any(|(known, _)| known == uri) {
-            let texts = self.protocol.subject.wiring.files.values();
-            let found = texts.filter_map(|t| serde_json::from_str::<Value>(t).ok()).find(|d| {
-                let text = |v: &Value| v.as_str().map(str::to_owned);
-                text(&d["namespace"]).as_deref() == Some(space)
-                    && text(&d["parameters"]["loadName"]).as_deref() == Some(name)
-                    && d["version"].as_u64() == Some(version)
-            });
             let Some(found) = found else {
                 let headline = format!("the definition `{uri}` of `{}` was not found", instance.name);
                 let help = "import the asset `from labware \"FILE.json\"`";

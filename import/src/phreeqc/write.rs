@@ -35,7 +35,7 @@ pub fn module(database: &Database, title: &str, wanted: &Wanted) -> Result<Impor
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
         Mistake { line: 0, why: format!("the written file cannot be read: {why}") }
     })?;
-    Ok(Imported { text, left_out: writer.left_out })
+    Ok(Imported { text, left_out: writer.left_out, files: Vec::new() })
 }
 
 #[derive(Default)]

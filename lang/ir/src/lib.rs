@@ -23,6 +23,7 @@ pub mod codes;
 pub mod diagnostic;
 pub mod equilibrium;
 pub mod extent;
+pub mod filling;
 pub mod footing;
 pub mod form;
 pub mod framing;

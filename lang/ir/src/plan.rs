@@ -101,13 +101,15 @@ impl Refusal {
     }
 }
 
-/// `presumes ever active else never_started`.
+/// `presumes ever active else never_started`, or `warns volume >= volumes.min else below_minimum`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Presumption {
     /// What is presumed.
     pub condition: Condition,
     /// Whether it is enough that it held at some moment before.
     pub ever: bool,
+    /// Whether its finding is a warning whatever its code is.
+    pub warns: bool,
 }
 
 /// One comparison inside a condition: `value` against limits, with the unit to show them in.

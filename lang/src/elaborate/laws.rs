@@ -428,18 +428,15 @@ impl<'a> Elaborator<'a> {
                         "rinse",
                         codes::WRONG_ARGUMENTS,
                         call.span,
-                        "`rinse` needs one vessel",
-                        "which vessel?",
+                        "`rinse` needs one thing",
+                        "which thing?",
                     )
-                    .help("write `rinse(vessel)`"),
+                    .help("write `rinse(thing)`"),
                 );
                 return Vec::new();
             };
             return match self.expr(&arg.value, scope) {
-                Value::Instance(i) => {
-                    let mixture = self.mixture_in(i, arg.value.span);
-                    mixture.map(|m| self.rinse(m, span)).unwrap_or_default()
-                }
+                Value::Instance(i) => self.rinse(self.walls_of(i), span),
                 Value::Error => Vec::new(),
                 other => {
                     self.expected("a vessel", &other, arg.value.span);
@@ -476,10 +473,12 @@ impl<'a> Elaborator<'a> {
         true
     }
 
-    /// `soil(a, from: b)`: the walls of `a` have touched what those of `b` have.
+    /// `soil(a, from: b)`: the walls of `a` have touched what those of `b` have; `soil(a, from: b, when: c)` if so.
     fn soil_call(&mut self, call: &'a Expr, args: &'a [Arg], span: Span, scope: &mut Scope) -> Vec<Action> {
-        let [to, from] = args else {
-            return self.soil_form(call.span);
+        let (to, from, when) = match args {
+            [to, from] => (to, from, None),
+            [to, from, when] if when.name.as_ref().is_some_and(|n| n.text == "when") => (to, from, Some(when)),
+            _ => return self.soil_form(call.span),
         };
         if to.name.is_some() || from.name.as_ref().is_none_or(|n| n.text != "from") {
             return self.soil_form(call.span);
@@ -495,8 +494,28 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
+        let when = match when {
+            Some(when) => {
+                let value = self.expr(&when.value, scope);
+                let Value::Bool(node) = self.coerce(value, &Type::Bool, when.value.span, "when") else {
+                    return Vec::new();
+                };
+                Some(node)
+            }
+            None => None,
+        };
+        if when.is_some_and(|node| self.graph.constant(node) == Some(0.0)) {
+            return Vec::new();
+        }
         self.soiled.insert((ends[0], ends[1]));
-        self.inherit(ends[0], ends[1], span)
+        let mut actions = self.inherit(ends[0], ends[1], span);
+        for action in &mut actions {
+            if let (Action::Assign { state, value, .. }, Some(when)) = (action, when) {
+                let before = self.graph.add(Op::State(*state));
+                *value = self.graph.select(when, *value, before);
+            }
+        }
+        actions
     }
 
     fn soil_form(&mut self, at: Span) -> Vec<Action> {

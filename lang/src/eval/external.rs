@@ -70,6 +70,12 @@ enum Bound {
     Brink,
     /// How far below its lip a tilted vessel reaches.
     Droop,
+    /// From the bottom of the inside of a vessel to its rim.
+    Depth,
+    /// The volume that a vessel holds up to a height.
+    Below,
+    /// How high a volume stands in a vessel.
+    StandingHeight,
     /// A number that a material states; without end where it states none.
     Stated,
     /// What the lab placed the instance on, by one of these prepositions.
@@ -154,6 +160,8 @@ const TABLE: &[(&str, Bound)] = &[
     ("sqrt", Bound::Sqrt),
     ("abs", Bound::Abs),
     ("brink", Bound::Brink),
+    ("depth", Bound::Depth),
+    ("held_below", Bound::Below),
     ("kept", Bound::Kept),
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
@@ -175,6 +183,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("placed", Bound::Placed),
     ("salts", Bound::Salts),
     ("soils", Bound::Soils),
+    ("standing_height", Bound::StandingHeight),
     ("stated", Bound::Stated),
     ("max_over_time", Bound::OverTime(Keep::Largest)),
     ("min_over_time", Bound::OverTime(Keep::Smallest)),
@@ -308,7 +317,10 @@ impl Elaborator<'_> {
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Kept, [Value::Instance(i), Value::Num(tilt)]) => self.kept(*i, tilt),
             (Bound::Brink, [Value::Instance(i), Value::Num(volume)]) => self.brink(*i, volume),
+            (Bound::StandingHeight, [Value::Instance(i), Value::Num(volume)]) => self.standing_height(*i, volume),
             (Bound::Droop, [Value::Instance(i), Value::Num(tilt), Value::Num(behind)]) => self.droop(*i, tilt, behind),
+            (Bound::Depth, [Value::Instance(i)]) => self.depth(*i),
+            (Bound::Below, [Value::Instance(i), Value::Num(height)]) => self.held_below(*i, height),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),

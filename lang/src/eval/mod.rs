@@ -10,6 +10,7 @@ pub mod compare;
 pub mod equilibrium;
 pub mod expr;
 pub mod external;
+mod filling;
 pub mod interactions;
 pub mod lab;
 pub mod lists;
@@ -74,6 +75,12 @@ impl Scope {
     /// The bit in `reads` of a position.
     pub fn read_bit(position: usize) -> u64 {
         1 << position.min(63)
+    }
+
+    /// Notes what was read of its locals in a scope that began as a copy of this one.
+    pub fn note_reads_of(&self, inner: &Scope) {
+        let own = (0..self.vars.len()).fold(0, |bits, at| bits | Self::read_bit(at));
+        self.reads.set(self.reads.get() | inner.reads.get() & own);
     }
 
     /// Adds a local.

@@ -112,7 +112,7 @@ impl Elaborator<'_> {
     }
 
     /// The value of a table at a place, or at the nearer of its ends.
-    fn read_off(&mut self, x: NodeId, points: impl Iterator<Item = [f64; 2]>) -> NodeId {
+    pub(super) fn read_off(&mut self, x: NodeId, points: impl Iterator<Item = [f64; 2]>) -> NodeId {
         let table: Vec<Point> = points.map(|[x, y]| (x, self.graph.number(y))).collect();
         let [(low, _), .., (high, _)] = table[..] else { return self.graph.number(f64::NAN) };
         let [low, high] = [low, high].map(|end| self.graph.number(end));

@@ -16,19 +16,15 @@ const TIP_WALL: f64 = 0.6;
 const TIP_PLAY: f64 = 0.2;
 const TIP_END: f64 = 0.2;
 
-/// The lines a definition stands for; all of them point to where its file is named.
-pub(super) fn of(definition: &Definition, text: &str, at: Span) -> Vec<AssetLine> {
+/// The lines a definition stands for, with its text where a robot takes that; all of them point to where its file is named.
+pub(super) fn of(definition: &Definition, text: Option<&str>, at: Span) -> Vec<AssetLine> {
     let write = Writer { definition, at };
-    let mut lines: Vec<AssetLine> = definition
-        .size()
-        .filter(|size| size.iter().all(|s| *s > 0.0))
-        .map(|size| AssetLine::Field(write.shape("shape", "box", &size)))
-        .into_iter()
-        .collect();
-    let known_by = definition.uri().map(|uri| write.expr(ExprKind::Text(uri)));
+    let mut lines: Vec<AssetLine> =
+        definition.size.map(|size| AssetLine::Field(write.shape("shape", "box", &size))).into_iter().collect();
+    let known_by = definition.uri.clone().map(|uri| write.expr(ExprKind::Text(uri)));
     lines.extend(known_by.map(|uri| AssetLine::Field(write.field("definition", uri))));
-    let whole = write.expr(ExprKind::Text(unbroken(text)));
-    lines.push(AssetLine::Field(write.field("described", whole)));
+    let whole = text.map(|text| write.expr(ExprKind::Text(unbroken(text))));
+    lines.extend(whole.map(|whole| AssetLine::Field(write.field("described", whole))));
     lines.extend(write.grids().into_iter().map(AssetLine::Grid));
     lines
 }
@@ -60,9 +56,9 @@ type Places<'d> = BTreeMap<Place, &'d Well>;
 impl<'d> Writer<'d> {
     fn grids(&self) -> Vec<Grid> {
         let mut alike: Vec<Places<'d>> = Vec::new();
-        let wells = self.definition.wells().filter_map(|(name, well)| Some((Place::parse(name)?, well)));
+        let wells = self.definition.wells.iter().filter_map(|(name, well)| Some((Place::parse(name)?, well)));
         for (place, well) in wells.collect::<Places<'d>>() {
-            let group = alike.iter_mut().find(|g| g.values().next().is_some_and(|w| same(w, well)));
+            let group = alike.iter_mut().find(|g| g.values().next().is_some_and(|w| w.is_like(well)));
             match group {
                 Some(group) => {
                     group.insert(place, well);
@@ -88,14 +84,14 @@ impl<'d> Writer<'d> {
         let across = |set: &BTreeSet<u32>| set.last().zip(set.first()).map_or(0, |(b, a)| b - a);
         let (wide, deep) = (across(&columns), across(&rows));
         let whole = (wide as usize + 1) * (deep as usize + 1) == group.len();
-        let [x, y, _] = self.definition.position(first.1);
-        let [right, front, _] = self.definition.position(last.1);
+        let [x, y, _] = first.1.at;
+        let [right, front, _] = last.1.at;
         let step = |over: f64, count: u32| if count == 0 { 0.0 } else { over / f64::from(count) };
         let pitch = [step(right - x, wide), step(y - front, deep)];
         let even = group.iter().all(|(place, well)| {
             let (column, row) =
                 (place.column - first.0.column, place.row.unwrap_or(0) as f64 - first.0.row.unwrap_or(0) as f64);
-            let [at_x, at_y, _] = self.definition.position(well);
+            let [at_x, at_y, _] = well.at;
             (x + f64::from(column) * pitch[0] - at_x).abs() < EVEN && (y - row * pitch[1] - at_y).abs() < EVEN
         });
         (whole && even).then_some(pitch)
@@ -103,26 +99,14 @@ impl<'d> Writer<'d> {
 
     fn line(&self, group: &Places<'d>, pitch: Option<[f64; 2]>) -> Option<Grid> {
         let ((from, well), (to, _)) = (group.first_key_value()?, group.last_key_value()?);
-        let (grid, kind) = if self.definition.is_tip_rack() { ("tips", "Tip") } else { ("wells", "Well") };
-        let (kind_of_shape, sizes) = match well.opening {
-            Opening::Circular { diameter } => ("cylinder", vec![diameter, well.depth]),
-            Opening::Rectangular { x_dimension, y_dimension } => ("box", vec![x_dimension, y_dimension, well.depth]),
-        };
-        // A bin's definition gives its one place no depth.
-        let sized = sizes.iter().all(|s| *s > 0.0);
-        let mut shape: Vec<Field> = sized.then(|| self.shape("room", kind_of_shape, &sizes)).into_iter().collect();
-        if let (true, Opening::Circular { diameter }) = (self.definition.is_tip_rack(), well.opening) {
-            shape = if sized { self.tip(diameter, well.depth) } else { Vec::new() };
-        }
-        let volume = self.quantity(well.total_liquid_volume, "uL");
-        let mut fields: Vec<Field> = std::iter::once(self.field("max_volume", volume)).chain(shape).collect();
-        if self.definition.is_tip_rack() {
-            let reach = self.definition.tip_reach().filter(|reach| *reach > 0.0);
-            fields.extend(reach.map(|reach| self.field("reach", self.quantity(reach, "mm"))));
+        let (grid, kind) = if self.definition.has_tips { ("tips", "Tip") } else { ("wells", "Well") };
+        let volume = self.quantity(well.volume, "uL");
+        let mut fields = vec![self.field("max_volume", volume)];
+        fields.extend(self.shapes(well));
+        if self.definition.has_tips {
+            fields.extend(well.reach.map(|reach| self.field("reach", self.quantity(reach, "mm"))));
         } else {
-            let (Opening::Circular { diameter: across } | Opening::Rectangular { y_dimension: across, .. }) =
-                well.opening;
-            fields.push(self.field("mouth", self.quantity(across, "mm")));
+            fields.extend(well.opening.map(|opening| self.field("mouth", self.quantity(opening.across(), "mm"))));
         }
         let ty = Path { segments: vec![self.name(kind)], span: self.at };
         Some(Grid {
@@ -130,10 +114,37 @@ impl<'d> Writer<'d> {
             from: self.name(&from.to_string()),
             to: (from != to).then(|| self.name(&to.to_string())),
             literal: AssetLiteral { ty, fields, span: self.at },
-            at: Some(self.lengths(&self.definition.position(well))),
+            at: Some(self.lengths(&well.at)),
             pitch: pitch.map(|p| self.lengths(&p)),
             row: None,
         })
+    }
+
+    /// The hole that a place is; of a tip, its body as well.
+    fn shapes(&self, well: &Well) -> Vec<Field> {
+        // A bin's definition gives its one place no depth.
+        let Some(opening) = well.opening.filter(|_| well.depth > 0.0) else { return Vec::new() };
+        match (opening, &well.inside) {
+            (Opening::Round(diameter), _) if self.definition.has_tips => self.tip(diameter, well.depth),
+            // A hole with its wall: outside and inside are the same.
+            (Opening::Round(_), Some(inside)) => {
+                let outline = || self.outline(inside.points());
+                vec![self.call("room", "turned", vec![outline(), outline()])]
+            }
+            (Opening::Round(diameter), None) => vec![self.shape("room", "cylinder", &[diameter, well.depth])],
+            (Opening::Square([x, y]), inside) => {
+                let inside = inside.as_ref().map(|inside| {
+                    let outline = || self.outline(inside.points());
+                    self.call("inside", "turned", vec![outline(), outline()])
+                });
+                std::iter::once(self.shape("room", "box", &[x, y, well.depth])).chain(inside).collect()
+            }
+        }
+    }
+
+    /// Radius and height of each point.
+    fn outline(&self, points: &[[f64; 2]]) -> Expr {
+        self.expr(ExprKind::List(points.iter().map(|point| self.lengths(point)).collect()))
     }
 
     fn name(&self, text: &str) -> Name {
@@ -177,15 +188,8 @@ impl<'d> Writer<'d> {
     /// says.
     fn tip(&self, diameter: f64, depth: f64) -> Vec<Field> {
         let (bore, end) = (diameter / 2.0, diameter / 2.0 * TIP_END);
-        let outline = |wall: f64| {
-            let points = [(end + wall, 0.0), (bore + wall, depth)];
-            self.expr(ExprKind::List(points.iter().map(|(r, z)| self.lengths(&[*r, *z])).collect()))
-        };
+        let outline = |wall: f64| self.outline(&[[end + wall, 0.0], [bore + wall, depth]]);
         let hole = self.shape("room", "cylinder", &[diameter + 2.0 * (TIP_WALL + TIP_PLAY), depth]);
         vec![self.call("shape", "turned", vec![outline(TIP_WALL), outline(0.0)]), hole]
     }
-}
-
-fn same(a: &Well, b: &Well) -> bool {
-    a.opening == b.opening && a.depth == b.depth && a.total_liquid_volume == b.total_liquid_volume
 }

@@ -287,19 +287,21 @@ impl<'a> Planner<'a, '_> {
         scope: &mut Scope,
     ) -> Option<Verb<'a>> {
         let mut lacking = Vec::new();
-        let mut fitting: Vec<(Verb<'a>, usize)> = Vec::new();
+        let mut fitting: Vec<(Verb<'a>, (usize, bool))> = Vec::new();
         for verb in verbs {
             match verb {
                 Verb::Skill(id) => {
-                    let ItemKind::Skill { sig, .. } = &self.lab.tables.names.decl(*id).item.kind else { continue };
-                    fitting.push((verb.clone(), misfit(sig, call, false)));
+                    let decl = self.lab.tables.names.decl(*id);
+                    let ItemKind::Skill { sig, .. } = &decl.item.kind else { continue };
+                    let other = self.is_of_other_kind(sig, decl.module, object);
+                    fitting.push((verb.clone(), (misfit(sig, call, false), other)));
                 }
                 Verb::Command(owner, m) => {
                     let MemberKind::Command { sig, .. } = &m.member.kind else { continue };
                     match self.device(sig, object, call, scope) {
                         Some(id) if self.lab.instance_is(id, *owner) => {
                             let by = !sig.params.is_empty() || object.is_none();
-                            fitting.push((verb.clone(), misfit(sig, call, by)));
+                            fitting.push((verb.clone(), (misfit(sig, call, by), false)));
                         }
                         device => lacking.push((*owner, device)),
                     }
@@ -345,6 +347,18 @@ impl<'a> Planner<'a, '_> {
         let place = format!("`{}` does not fit here", self.form(sig));
         self.lab.report(import.offered(Diagnostic::about(&text, codes::UNKNOWN_VERB, span, headline, place)));
         true
+    }
+
+    /// Whether a verb is about things of another kind than the one named.
+    fn is_of_other_kind(&mut self, sig: &'a Sig, module: usize, object: &Option<(Value, Span)>) -> bool {
+        let (Some(param), Some((Value::Instance(id) | Value::Qualified(id, _), _))) = (sig.params.first(), object)
+        else {
+            return false;
+        };
+        match param.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, module)) {
+            Some(Type::Instance { kinds, .. }) => !kinds.iter().all(|kind| self.lab.instance_is(*id, *kind)),
+            _ => false,
+        }
     }
 
     /// How badly what a verb is about fits: a quantity where a thing is expected says more than a word that is missing.
@@ -483,6 +497,7 @@ impl<'a> Planner<'a, '_> {
             }
             let group = sig.labelled.iter().find(|(l, _)| l.text == label.text);
             match group.map(|(_, params)| params.as_slice()) {
+                Some([p]) if p.of.is_some() => {}
                 Some([p]) => good &= self.argument_of(p, e, module, scope, &mut values),
                 Some(params) => match &*e.kind {
                     ExprKind::Tuple(items, None) if items.len() == params.len() => {
@@ -514,6 +529,7 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             match &p.default {
+                Some(_) if p.of.is_some() => {}
                 Some(_) if params.iter().all(|p| p.default.is_some()) => {
                     for (p, e) in params.iter().filter_map(|p| Some((p, p.default.as_ref()?))) {
                         good &= self.argument_of(p, e, module, &mut Scope::module(module), &mut values);
@@ -536,8 +552,56 @@ impl<'a> Planner<'a, '_> {
                 }
             }
         }
+        // Behind the others, as they may name functions of what another argument is.
+        for (label, params) in &sig.labelled {
+            let [p @ Param { of: Some(of), .. }] = params.as_slice() else { continue };
+            let given = call.labelled.iter().find(|(l, _)| l.text == label.text).map(|(_, e)| e);
+            let thing = values.iter().find(|(name, _)| *name == of.text).map(|(_, value)| value.clone());
+            good &= match (given, &p.default) {
+                (Some(e), _) => self.argument_about(p, e, module, thing, scope, &mut values),
+                (None, Some(e)) => self.argument_about(p, e, module, thing, &mut Scope::module(module), &mut values),
+                (None, None) => true,
+            };
+        }
         good &= self.options(&what, clauses, module, &call.options, call.span, scope, &mut values);
+        // In the order of declaration, whatever the call's: what has been worked out for one call is known again by where arguments stand.
+        let options = clauses.iter().filter_map(|c| match &c.kind {
+            ClauseKind::Option(p) => Some(p.name.text.as_str()),
+            _ => None,
+        });
+        let declared: Vec<&str> = sig.all_params().map(|p| p.name.text.as_str()).chain(options).collect();
+        values.sort_by_key(|(name, _)| declared.iter().position(|known| known == name));
         good.then_some(Bound { values })
+    }
+
+    /// An argument in which the names of functions of one thing stand for what they are of that: `bottom + 2 mm` of a well.
+    fn argument_about(
+        &mut self,
+        p: &'a Param,
+        e: &'a Expr,
+        module: usize,
+        thing: Option<Value>,
+        scope: &mut Scope,
+        out: &mut Vec<(String, Value)>,
+    ) -> bool {
+        let mut inner = scope.clone();
+        let first = match thing {
+            Some(Value::List(all)) => all.first().cloned(),
+            other => other,
+        };
+        for name in crate::eval::lab::given::names_of(e) {
+            let Some(id) = self.lab.tables.names.lookup(module, name) else { continue };
+            let is_of_one =
+                matches!(&self.lab.tables.names.decl(id).item.kind, ItemKind::Fn { params, .. } if params.len() == 1);
+            if let Some(thing) = first.clone().filter(|_| is_of_one)
+                && let Some(value) = self.lab.call_with(id, vec![thing])
+            {
+                inner.bind(name, value);
+            }
+        }
+        let good = self.argument_of(p, e, module, &mut inner, out);
+        scope.note_reads_of(&inner);
+        good
     }
 
     /// The value of a pair of brackets of a signature: for several parameters a tuple of as many.

@@ -137,7 +137,12 @@ impl<'a> Planner<'a, '_> {
                     }
                 }
                 (Outcome::Condition(c), ClauseKind::Presumes { ever, .. }) => {
-                    operation.presumes.push(Presumption { condition: Arc::unwrap_or_clone(c), ever: *ever });
+                    let condition = Arc::unwrap_or_clone(c);
+                    operation.presumes.push(Presumption { condition, ever: *ever, warns: false });
+                }
+                (Outcome::Condition(c), ClauseKind::Warns { .. }) => {
+                    let condition = Arc::unwrap_or_clone(c);
+                    operation.presumes.push(Presumption { condition, ever: false, warns: true });
                 }
                 (Outcome::Condition(c), ClauseKind::Until(_)) => operation.until = Some(Arc::unwrap_or_clone(c)),
                 (Outcome::Condition(c), _) => invariants.push(Arc::unwrap_or_clone(c)),
@@ -163,7 +168,8 @@ impl<'a> Planner<'a, '_> {
 
     /// Whether a draft looks at a condition once it knows all that the plan moves.
     fn defers(&mut self, clause: &'a Clause, inner: &Scope) -> bool {
-        let defers = self.draft && matches!(clause.kind, ClauseKind::Needs { .. } | ClauseKind::Presumes { .. });
+        use ClauseKind::{Needs, Presumes, Warns};
+        let defers = self.draft && matches!(clause.kind, Needs { .. } | Presumes { .. } | Warns { .. });
         if defers {
             self.deferred.push((clause, inner.clone()));
         }
@@ -185,7 +191,7 @@ impl<'a> Planner<'a, '_> {
     /// What comes of a clause of an operation that says something of it; none where it is wrong.
     fn clause(&mut self, clause: &'a Clause, inner: &mut Scope) -> Option<Outcome> {
         Some(match &clause.kind {
-            ClauseKind::Needs { .. } | ClauseKind::Presumes { .. } => {
+            ClauseKind::Needs { .. } | ClauseKind::Presumes { .. } | ClauseKind::Warns { .. } => {
                 Outcome::Condition(Arc::new(self.need(clause, inner)?))
             }
             ClauseKind::While(e) | ClauseKind::Until(e) => Outcome::Condition(Arc::new(self.condition(e, inner)?)),
@@ -314,11 +320,11 @@ impl<'a> Planner<'a, '_> {
             }
             match &clause.kind {
                 ClauseKind::Needs { .. } => needs.extend(self.need(clause, inner).map(Arc::new)),
-                ClauseKind::Presumes { .. } => self.lab.report(Diagnostic::error(
+                ClauseKind::Presumes { .. } | ClauseKind::Warns { .. } => self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     clause.span,
-                    "a skill with a body cannot have `presumes`",
-                    "`presumes` is for a command or an `extern skill`",
+                    "a skill with a body can have neither `presumes` nor `warns`",
+                    "for a command or an `extern skill`",
                 )),
                 ClauseKind::While(e) => invariants.extend(self.condition(e, inner)),
                 ClauseKind::Effect(effects) => {

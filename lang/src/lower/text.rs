@@ -167,9 +167,12 @@ impl<'a> Planner<'a, '_> {
         compared.into_iter().map(|c| Comparison { text: words(&c), ..c.comparison }).collect()
     }
 
-    /// What a `needs` or `presumes` clause asks, with the failure and the help it names.
+    /// What a `needs`, `presumes` or `warns` clause asks, with the failure and the help it names.
     pub fn need(&mut self, clause: &'a Clause, scope: &mut Scope) -> Option<Condition> {
-        let (ClauseKind::Needs { cond, refusal } | ClauseKind::Presumes { cond, refusal, .. }) = &clause.kind else {
+        let (ClauseKind::Needs { cond, refusal }
+        | ClauseKind::Presumes { cond, refusal, .. }
+        | ClauseKind::Warns { cond, refusal }) = &clause.kind
+        else {
             return None;
         };
         self.demanded(cond, refusal.as_ref(), scope)

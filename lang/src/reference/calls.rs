@@ -160,6 +160,9 @@ fn facts(module: &Module, sig: &Sig, clauses: &[Clause]) -> Vec<String> {
                 let ever = if *ever { "at some moment before " } else { "" };
                 out.push(format!("- presumes {ever}{}{}", shown(cond.span), refused(refusal.as_ref())));
             }
+            ClauseKind::Warns { cond, refusal } => {
+                out.push(format!("- warns unless {}{}", shown(cond.span), refused(refusal.as_ref())));
+            }
             ClauseKind::While(cond) => out.push(format!("- as long as {}, else `broken`", shown(cond.span))),
             ClauseKind::Until(cond) => out.push(format!("- lasts until {}", shown(cond.span))),
             ClauseKind::Takes { nominal, bounds } => {

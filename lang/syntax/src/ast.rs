@@ -728,6 +728,8 @@ pub struct Param {
     pub name: Name,
     /// Its type.
     pub ty: Option<Type>,
+    /// `of source`: the other argument whose functions its value may name.
+    pub of: Option<Name>,
     /// Its default.
     pub default: Option<Expr>,
 }
@@ -796,6 +798,13 @@ pub enum ClauseKind {
         /// Whether it is enough that it held at some moment before.
         ever: bool,
         /// What must hold on some way at least.
+        cond: Expr,
+        /// What its finding is called.
+        refusal: Option<Refusal>,
+    },
+    /// `warns volume >= volumes.min else below_minimum`: a warning where it does not hold; the run goes on.
+    Warns {
+        /// What should hold.
         cond: Expr,
         /// What its finding is called.
         refusal: Option<Refusal>,

@@ -418,8 +418,8 @@ const PHRASE_WORDS: &[&str] =
 
 /// The words that start a clause.
 const CLAUSE_WORDS: &[&str] = &[
-    "needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips", "frees",
-    "leads",
+    "needs", "presumes", "warns", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips",
+    "frees", "leads",
 ];
 
 /// The head of a line: what stands before its bracket.

@@ -158,6 +158,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_after
             | kw_needs
             | kw_presumes
+            | kw_warns
             | kw_effect
             | kw_takes
             | kw_fails

@@ -100,7 +100,7 @@ parts! {
     Law { kind span }
     Text { parts span }
     Type { paths words argument optional condition span }
-    Param { name ty default }
+    Param { name ty of default }
     Sig { verb params labelled result span }
     Clause { kind span }
     Refusal { failure help because }
@@ -243,6 +243,7 @@ impl Relocate for ClauseKind {
         match self {
             ClauseKind::Needs { cond, refusal } => each!(put: cond refusal),
             ClauseKind::Presumes { ever, cond, refusal } => each!(put: ever cond refusal),
+            ClauseKind::Warns { cond, refusal } => each!(put: cond refusal),
             ClauseKind::While(a) => each!(put: a),
             ClauseKind::Fails(a) => each!(put: a),
             ClauseKind::Effect(a) => each!(put: a),

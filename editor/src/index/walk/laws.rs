@@ -132,7 +132,9 @@ impl Walk<'_> {
 
     fn clause(&mut self, clause: &ClauseKind) {
         match clause {
-            ClauseKind::Needs { cond, refusal } | ClauseKind::Presumes { cond, refusal, .. } => {
+            ClauseKind::Needs { cond, refusal }
+            | ClauseKind::Presumes { cond, refusal, .. }
+            | ClauseKind::Warns { cond, refusal } => {
                 self.condition(cond, refusal.as_ref());
             }
             ClauseKind::While(e) | ClauseKind::Until(e) => drop(self.expr(e)),

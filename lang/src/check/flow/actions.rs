@@ -148,11 +148,11 @@ impl Interpreter<'_, '_> {
         if self.cleaning > 0 {
             return;
         }
-        for Presumption { condition, ever } in presumes {
+        for Presumption { condition, ever, warns } in presumes {
             let node = condition.node;
             let fails = self.eval(node, facts).truth() == Some(false) && !(*ever && facts.held.contains(&node));
             if fails && !self.is_shared(node) {
-                self.in_vain(label, condition, facts);
+                self.in_vain(label, condition, facts, *warns);
                 facts.held.insert(node);
             }
         }

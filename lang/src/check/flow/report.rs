@@ -165,21 +165,29 @@ impl Interpreter<'_, '_> {
             Some(r) => format!("`{label}` fails: {}", r.failure.replace('_', " ")),
             None => format!("`{label}` needs `{}`, which is false here", need.text),
         };
-        self.demand(what, "this step fails", need, facts, some);
+        self.demand(what, "this step fails", need, facts, (some, None));
     }
 
     /// Something presumed that holds on no way.
-    pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &AbstractState) {
+    pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &AbstractState, warns: bool) {
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &presumed.refusal {
             Some(r) => format!("`{label}` has no effect: {}", r.failure.replace('_', " ")),
             None => format!("`{label}` has no effect: it presumes `{}`, which was never true", presumed.text),
         };
-        self.demand(what, "this step is unnecessary", presumed, facts, false);
+        let severity = warns.then_some(Severity::Warning);
+        self.demand(what, "this step is unnecessary", presumed, facts, (false, severity));
     }
 
     /// A demand that does not hold: in its own words where it has them, which a label at the step then says the consequence of.
-    fn demand(&mut self, what: String, so: &str, need: &Condition, facts: &AbstractState, some: bool) {
+    fn demand(
+        &mut self,
+        what: String,
+        so: &str,
+        need: &Condition,
+        facts: &AbstractState,
+        (some, severity): (bool, Option<Severity>),
+    ) {
         let code = need.code();
         let open = some.then(|| self.ways.meetings());
         let some = some || self.doubt > 0;
@@ -197,6 +205,7 @@ impl Interpreter<'_, '_> {
             (false, false) => measured.join(", "),
         };
         let mut d = self.at_site(code, headline, said, some);
+        d.severity = severity.unwrap_or(d.severity);
         // The first that is missing ends a call; what its later steps lack follows from that.
         if self.findings.iter().any(|f| f.is_error() && f.diagnostic.span() == d.span() && f.about != need.span) {
             return;

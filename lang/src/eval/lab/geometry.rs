@@ -44,6 +44,8 @@ pub struct Geometry {
     pub solids: Vec<Solid>,
     /// What it takes out of what it is a part of.
     pub room: Option<Shape>,
+    /// A turned shape with an inside as wide at every height as its own, which is not round.
+    pub inside: Option<Shape>,
     /// More of it on links that move, by index.
     pub moving: Vec<(u32, Solid)>,
     /// What others run into instead of shape and solids.
@@ -87,6 +89,7 @@ impl<'a> Elaborator<'a> {
     fn find_geometry(&mut self, id: InstanceId) -> Geometry {
         let mut out = Geometry::default();
         out.room = self.given_shape(id, "room");
+        out.inside = self.given_shape(id, "inside");
         // What is nothing but room has its points where that is.
         out.shape = self.given_shape(id, "shape").or_else(|| out.room.clone());
         self.coverings(id, &mut out);

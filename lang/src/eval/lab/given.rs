@@ -30,6 +30,13 @@ fn takes_start(m: &MemberRef<'_>) -> bool {
     matches!(&m.member.kind, MemberKind::Value { role: Role::Param, options, .. } if word(options, GIVEN_BY) == Some("at"))
 }
 
+/// The words of an expression that may be names, each once.
+pub fn names_of(e: &Expr) -> std::collections::BTreeSet<&str> {
+    let mut out = Vec::new();
+    names_in(e, &mut out);
+    out.into_iter().collect()
+}
+
 /// The words of an expression that may be names of members.
 fn names_in<'e>(e: &'e Expr, out: &mut Vec<&'e str>) {
     match &*e.kind {

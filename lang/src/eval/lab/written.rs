@@ -10,7 +10,7 @@ use crate::names::DeclId;
 
 /// Fields every asset may have beside the members of its capabilities: geometry, and what follows from it.
 pub(crate) const GEOMETRY: &[&str] =
-    &["shape", "room", "tip", "base", "home", "mounted", "mesh", "collision", "inertia"];
+    &["shape", "room", "inside", "tip", "base", "home", "mounted", "mesh", "collision", "inertia"];
 
 impl<'a> Elaborator<'a> {
     /// The capability or asset a path names.

@@ -99,6 +99,7 @@ pub(super) fn param(param: &Param) -> Sexp {
     node("param")
         .with([name(&param.name)])
         .with(param.ty.as_ref().map(ty))
+        .with(param.of.as_ref().map(|of| node("of").with([name(of)])))
         .with(maybe("default", param.default.as_ref()))
 }
 

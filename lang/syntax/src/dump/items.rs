@@ -247,6 +247,7 @@ fn clause(clause: &Clause) -> Sexp {
             let word = if *ever { "presumes ever" } else { "presumes" };
             demand(word, cond, refusal.as_ref())
         }
+        ClauseKind::Warns { cond, refusal } => demand("warns", cond, refusal.as_ref()),
         ClauseKind::While(cond) => node("while").with([expr(cond)]),
         ClauseKind::Fails(all) => node("fails").with(names(all)),
         ClauseKind::Effect(effects) => node("effect").with(effects.iter().map(effect)),

@@ -140,6 +140,11 @@ impl Lower<'_> {
                 let (cond, refusal) = self.demand(kids);
                 ClauseKind::Presumes { ever, cond, refusal }
             }
+            Rule::warns => {
+                kids.has(Rule::kw_warns);
+                let (cond, refusal) = self.demand(kids);
+                ClauseKind::Warns { cond, refusal }
+            }
             Rule::while_ => {
                 kids.has(Rule::kw_while);
                 ClauseKind::While(self.expr_in(kids))

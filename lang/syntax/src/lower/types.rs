@@ -71,16 +71,20 @@ impl Lower<'_> {
 
     /// The parameters of the group that stands next; none where there is no group.
     pub(super) fn params_in(&mut self, kids: &mut Kids) -> Vec<Param> {
-        let Some(group) = kids.eat(Rule::params) else { return Vec::new() };
-        Kids::of(group).all(Rule::param).into_iter().map(|p| self.param(p)).collect()
+        let Some(group) = kids.eat(Rule::params).or_else(|| kids.eat(Rule::group_params)) else { return Vec::new() };
+        let mut kids = Kids::of(group);
+        let mut params = kids.all(Rule::param);
+        params.extend(kids.all(Rule::group_param));
+        params.into_iter().map(|p| self.param(p)).collect()
     }
 
     pub(super) fn param(&mut self, node: Node) -> Param {
         let mut kids = Kids::of(node);
         let name = self.name_in(&mut kids);
         let ty = kids.eat(Rule::ty).map(|t| self.ty(t));
+        let of = kids.has(Rule::kw_of).then(|| self.name_in(&mut kids));
         let default = kids.eat(Rule::cond).map(|c| self.expr(c));
-        Param { name, ty, default }
+        Param { name, ty, of, default }
     }
 
     pub(super) fn sig_in(&mut self, kids: &mut Kids) -> Sig {

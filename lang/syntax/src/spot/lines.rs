@@ -19,7 +19,7 @@ pub(super) fn function_call(spot: &Spot) -> Option<Mistake> {
 
 /// `needs cond because "..."`: only a failure with a name is explained.
 pub(super) fn because(spot: &Spot) -> Option<Mistake> {
-    let asks = matches!(spot.form(), "needs" | "presumes" | "keeps" | "ends");
+    let asks = matches!(spot.form(), "needs" | "presumes" | "warns" | "keeps" | "ends");
     if spot.only == Rule::only_stmt || spot.token != "because" || !asks {
         return None;
     }
@@ -191,7 +191,7 @@ pub(super) fn out_of_place(spot: &Spot) -> Option<Mistake> {
             "`on` has no block before it",
             "write it right after the `}` of a `step`, `sequence`, `parallel`, `try`, `keep` or `within`",
         ),
-        "takes" | "needs" | "presumes" | "effect" | "says" | "option" | "fails" => (
+        "takes" | "needs" | "presumes" | "warns" | "effect" | "says" | "option" | "fails" => (
             "a clause of a skill must come before its block",
             "write it on a line between the signature of the skill and its `{`; a primitive, `extern skill`, has no block",
         ),

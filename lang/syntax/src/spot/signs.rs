@@ -132,7 +132,7 @@ pub(super) fn reaction_arrow(spot: &Spot) -> Option<Mistake> {
 pub(super) fn equals(spot: &Spot) -> Option<Mistake> {
     let condition = match spot.only {
         Rule::only_stmt => ["expect", "if", "wait", "repeat", "hold", "keep"].contains(&spot.form()),
-        Rule::only_clause => ["needs", "presumes", "while", "until"].contains(&spot.form()),
+        Rule::only_clause => ["needs", "presumes", "warns", "while", "until"].contains(&spot.form()),
         Rule::only_item => ["process", "event"].contains(&spot.form()),
         Rule::only_law | Rule::only_member => ["if", "process", "event"].contains(&spot.form()),
         _ => false,

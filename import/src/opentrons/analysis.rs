@@ -1,0 +1,103 @@
+//! An analysis of a protocol: the commands that it would run, as Opentrons' software writes them (`opentrons analyze --json-output`), or the
+//! commands of a JSON protocol of schema 6 to 8.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::Mistake;
+
+/// The file.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Analysis {
+    pub(super) commands: Vec<Command>,
+    #[serde(default)]
+    pub(super) errors: Vec<Trouble>,
+    #[serde(default)]
+    pub(super) metadata: BTreeMap<String, Value>,
+    #[serde(default)]
+    robot_type: Option<String>,
+    #[serde(default)]
+    robot: Option<Robot>,
+    /// Liquids: a list in an analysis, by identifier in a protocol.
+    #[serde(default)]
+    liquids: Value,
+    /// Definitions of a JSON protocol.
+    #[serde(default)]
+    pub(super) labware_definitions: BTreeMap<String, Value>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Robot {
+    #[serde(default)]
+    model: String,
+}
+
+/// An error of the analysis.
+#[derive(Debug, Deserialize)]
+pub(super) struct Trouble {
+    #[serde(default)]
+    pub(super) detail: String,
+}
+
+/// One command.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Command {
+    pub(super) command_type: String,
+    #[serde(default)]
+    pub(super) params: Value,
+    #[serde(default)]
+    pub(super) result: Value,
+}
+
+impl Analysis {
+    /// Reads it.
+    pub(super) fn read(text: &str) -> Result<Analysis, Mistake> {
+        let read: Analysis = serde_json::from_str(text).map_err(|e| {
+            let why = format!("this is neither an analysis nor a JSON protocol of Opentrons ({e})");
+            Mistake { line: e.line(), why }
+        })?;
+        if let Some(trouble) = read.errors.first() {
+            let why = format!("the protocol fails in its analysis: {}", trouble.detail.replace('\n', " "));
+            return Err(Mistake { line: 0, why });
+        }
+        let robot = read.robot_type.as_deref().or(read.robot.as_ref().map(|r| r.model.as_str()));
+        if let Some(robot) = robot.filter(|robot| !robot.starts_with("OT-2")) {
+            return Err(Mistake {
+                line: 0,
+                why: format!("it is for `{robot}`; only protocols of the OT-2 are imported"),
+            });
+        }
+        Ok(read)
+    }
+
+    /// The name of a liquid.
+    pub(super) fn liquid(&self, id: &str) -> Option<&str> {
+        let entry = match &self.liquids {
+            Value::Array(all) => all.iter().find(|liquid| liquid["id"] == id),
+            Value::Object(all) => all.get(id),
+            _ => None,
+        };
+        entry?["displayName"].as_str()
+    }
+}
+
+impl Command {
+    /// A text among its parameters; empty where there is none.
+    pub(super) fn text(&self, name: &str) -> &str {
+        self.params[name].as_str().unwrap_or("")
+    }
+
+    /// A number among its parameters.
+    pub(super) fn number(&self, name: &str) -> Option<f64> {
+        self.params[name].as_f64()
+    }
+
+    /// What its result or, in a JSON protocol, its parameters call what it loads.
+    pub(super) fn loaded(&self, name: &str) -> Option<&str> {
+        self.result[name].as_str().or_else(|| self.params[name].as_str())
+    }
+}

@@ -1,0 +1,280 @@
+//! What stands on the deck: names for it, and what of its definitions a protocol needs.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+
+use serde_json::Value;
+
+use super::analysis::{Analysis, Command};
+use super::library::{Library, Pipette};
+use super::node::{At, Place, cell};
+use super::words;
+
+/// The name space of definitions that come with Opentrons' software.
+const OWN: &str = "opentrons";
+
+/// How far apart channels are, mm.
+const PITCH: f64 = 9.0;
+
+/// What a piece of labware is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Wells,
+    Tips,
+}
+
+/// A well as its definition has it, mm.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Well {
+    pub(super) depth: f64,
+    /// Of its opening, mm2.
+    area: f64,
+    /// What it holds, uL.
+    capacity: f64,
+    x: f64,
+    y: f64,
+}
+
+/// A piece of labware.
+#[derive(Debug)]
+pub(super) struct Labware {
+    pub(super) name: String,
+    pub(super) asset: String,
+    pub(super) kind: Kind,
+    /// What it stands on, as the language writes it.
+    pub(super) on: String,
+    pub(super) wells: BTreeMap<String, Well>,
+    /// Wells in the order of columns.
+    pub(super) order: Vec<String>,
+}
+
+/// A pipette on its mount.
+#[derive(Debug)]
+pub(super) struct Mounted {
+    pub(super) mount: String,
+    pub(super) pipette: Pipette,
+}
+
+/// A module.
+#[derive(Debug)]
+pub(super) struct Module {
+    pub(super) name: String,
+    pub(super) asset: String,
+    pub(super) slot: String,
+}
+
+/// Everything that is loaded.
+#[derive(Debug, Default)]
+pub(super) struct Deck {
+    pub(super) labware: BTreeMap<String, Labware>,
+    pub(super) pipettes: BTreeMap<String, Mounted>,
+    pub(super) modules: BTreeMap<String, Module>,
+    /// Identifiers of labware and modules in the order in which they are loaded.
+    pub(super) loaded: Vec<String>,
+    /// Assets that the file declares itself, with what they are made from.
+    pub(super) assets: BTreeMap<String, String>,
+    /// Assets of the library.
+    pub(super) used: BTreeSet<String>,
+    /// Definitions that go beside the file, by the file's name.
+    pub(super) files: BTreeMap<String, String>,
+    names: BTreeSet<String>,
+    asset_names: BTreeSet<String>,
+}
+
+impl Deck {
+    /// An empty deck; these names are taken.
+    pub(super) fn new(taken: &[&str]) -> Deck {
+        let names = taken.iter().map(|name| (*name).to_owned()).collect();
+        Deck { names, ..Deck::default() }
+    }
+
+    /// Loads what a command loads; why it cannot be.
+    pub(super) fn load(&mut self, command: &Command, analysis: &Analysis, library: &Library) -> Result<(), String> {
+        match command.command_type.as_str() {
+            "loadPipette" => {
+                let name = command.text("pipetteName");
+                let known = library.pipette(name).ok_or_else(|| format!("the library has no pipette `{name}`"))?;
+                let mounted = Mounted { mount: command.text("mount").to_owned(), pipette: known.clone() };
+                self.used.insert(known.asset.clone());
+                let id = command.loaded("pipetteId").unwrap_or(name);
+                self.pipettes.insert(id.to_owned(), mounted);
+            }
+            "loadModule" => {
+                let model = command.text("model");
+                let model = command.result["model"].as_str().unwrap_or(model);
+                let asset = library.module(model).ok_or_else(|| format!("the library has no module `{model}`"))?;
+                let name = words::name_of(module_word(model), "module", &mut self.names);
+                self.used.insert(asset.to_owned());
+                let slot = slot(&command.params["location"]).unwrap_or_else(|| "7".to_owned());
+                let id = command.loaded("moduleId").unwrap_or(model).to_owned();
+                self.loaded.push(id.clone());
+                self.modules.insert(id, Module { name, asset: asset.to_owned(), slot });
+            }
+            _ => self.load_labware(command, analysis, library)?,
+        }
+        Ok(())
+    }
+
+    fn load_labware(&mut self, command: &Command, analysis: &Analysis, library: &Library) -> Result<(), String> {
+        let [load_name, space] = ["loadName", "namespace"].map(|key| command.text(key));
+        let version = command.params["version"].as_u64().unwrap_or(1);
+        let uri = format!("{space}/{load_name}/{version}");
+        let definition = match &command.result["definition"] {
+            Value::Null => analysis.labware_definitions.get(&uri).unwrap_or(&Value::Null),
+            found => found,
+        };
+        let on = self.place_of(&command.params["location"])?;
+        let category = definition["metadata"]["displayCategory"].as_str().unwrap_or("wellPlate");
+        let kind = if definition["parameters"]["isTiprack"] == true { Kind::Tips } else { Kind::Wells };
+        let asset = match library.labware(load_name) {
+            Some(asset) if space == OWN => {
+                self.used.insert(asset.to_owned());
+                asset.to_owned()
+            }
+            _ => self.asset_of(load_name, space, version, definition),
+        };
+        let label = command.text("displayName");
+        let name = words::name_of(label, category_word(category), &mut self.names);
+        let (wells, order) = (wells(definition), order(definition));
+        let id = command.loaded("labwareId").unwrap_or(load_name).to_owned();
+        self.loaded.push(id.clone());
+        self.labware.insert(id, Labware { name, asset, kind, on, wells, order });
+        Ok(())
+    }
+
+    /// The asset of a definition that the library has no name for.
+    fn asset_of(&mut self, load_name: &str, space: &str, version: u64, definition: &Value) -> String {
+        let from = match space == OWN {
+            true => load_name.to_owned(),
+            false => {
+                let file = format!("{space}_{load_name}_{version}.json");
+                self.files.insert(file.clone(), format!("{definition:#}\n"));
+                file
+            }
+        };
+        if let Some((known, _)) = self.assets.iter().find(|(_, of)| **of == from) {
+            return known.clone();
+        }
+        let name = words::asset_name(load_name, &mut self.asset_names);
+        self.assets.insert(name.clone(), from);
+        name
+    }
+
+    fn place_of(&self, location: &Value) -> Result<String, String> {
+        if let Some(slot) = slot(location) {
+            return Ok(format!("ot2.slot[{slot}]"));
+        }
+        if let Some(module) = location["moduleId"].as_str().and_then(|id| self.modules.get(id)) {
+            return Ok(module.name.clone());
+        }
+        if let Some(under) = location["labwareId"].as_str().and_then(|id| self.labware.get(id)) {
+            return Ok(under.name.clone());
+        }
+        Err("it stands on no place of the deck".to_owned())
+    }
+
+    /// What a pipette with several channels reaches from a well, or why it is nothing that can be said.
+    pub(super) fn reached(&self, channels: usize, labware: &Labware, well: &str) -> Result<Place, String> {
+        let of = labware.name.clone();
+        let at = |at| Ok(Place { of: of.clone(), at });
+        let Some(first) = labware.wells.get(well) else { return Err(format!("`{of}` has no well {well}")) };
+        let in_column = |other: &&String| labware.wells.get(*other).is_some_and(|o| (o.x - first.x).abs() < 0.1);
+        let column: Vec<&String> = labware.order.iter().filter(in_column).collect();
+        if channels == 1 || column.len() == 1 {
+            return at(At::Well(well.to_owned()));
+        }
+        let reached: Option<Vec<String>> = (0..channels)
+            .map(|channel| {
+                let y = first.y - PITCH * channel as f64;
+                let found =
+                    column.iter().find(|other| labware.wells.get(**other).is_some_and(|o| (o.y - y).abs() < 0.5));
+                found.map(|well| (*well).clone())
+            })
+            .collect();
+        let Some(reached) = reached else {
+            return Err("some of its channels reach no well".to_owned());
+        };
+        match cell(well) {
+            Some((1, number)) if reached.len() == column.len() => at(At::Column(number as usize)),
+            _ => at(At::Wells(reached)),
+        }
+    }
+
+    /// What a well takes, uL.
+    pub(super) fn capacity(&self, labware: &str, well: &str) -> f64 {
+        let labware = self.labware.values().find(|known| known.name == labware);
+        labware.and_then(|labware| labware.wells.get(well)).map_or(0.0, |well| well.capacity)
+    }
+
+    /// What the first well of a place holds up to a height, uL: as if it were as wide as its opening, and no more than it takes.
+    pub(super) fn held_below(&self, place: &Place, height: f64) -> f64 {
+        let labware = self.labware.values().find(|labware| labware.name == place.of);
+        let well = self.wells_of(place).first().and_then(|name| labware?.wells.get(name));
+        well.map_or(0.0, |well| (well.area * height.max(0.0)).min(well.capacity))
+    }
+
+    /// Wells of a place.
+    pub(super) fn wells_of(&self, place: &Place) -> Vec<String> {
+        match &place.at {
+            At::Well(well) => vec![well.clone()],
+            At::Wells(wells) => wells.clone(),
+            At::Column(number) => {
+                let labware = self.labware.values().find(|labware| labware.name == place.of);
+                let order = labware.map_or(&[][..], |labware| &labware.order);
+                order.iter().filter(|w| cell(w).is_some_and(|(_, c)| c as usize == *number)).cloned().collect()
+            }
+        }
+    }
+}
+
+fn slot(location: &Value) -> Option<String> {
+    location["slotName"].as_str().map(str::to_owned)
+}
+
+fn wells(definition: &Value) -> BTreeMap<String, Well> {
+    let Some(all) = definition["wells"].as_object() else { return BTreeMap::new() };
+    let number = |well: &Value, key: &str| well[key].as_f64().unwrap_or(0.0);
+    let area = |well: &Value| match well["diameter"].as_f64() {
+        Some(diameter) => PI * diameter * diameter / 4.0,
+        None => number(well, "xDimension") * number(well, "yDimension"),
+    };
+    let read = |well: &Value| Well {
+        depth: number(well, "depth"),
+        area: area(well),
+        capacity: number(well, "totalLiquidVolume"),
+        x: number(well, "x"),
+        y: number(well, "y"),
+    };
+    all.iter().map(|(name, well)| (name.clone(), read(well))).collect()
+}
+
+fn order(definition: &Value) -> Vec<String> {
+    let columns = definition["ordering"].as_array().into_iter().flatten();
+    columns
+        .flat_map(|column| column.as_array().into_iter().flatten())
+        .filter_map(|w| w.as_str())
+        .map(str::to_owned)
+        .collect()
+}
+
+fn category_word(category: &str) -> &'static str {
+    match category {
+        "tipRack" => "tips",
+        "reservoir" => "reservoir",
+        "tubeRack" => "tubes",
+        "aluminumBlock" => "block",
+        "adapter" => "adapter",
+        "trash" => "bin",
+        _ => "plate",
+    }
+}
+
+fn module_word(model: &str) -> &'static str {
+    match model {
+        m if m.starts_with("temperature") => "cooler",
+        m if m.starts_with("magnetic") => "magnet",
+        m if m.starts_with("thermocycler") => "cycler",
+        m if m.starts_with("heaterShaker") => "shaker",
+        _ => "module",
+    }
+}

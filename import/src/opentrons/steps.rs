@@ -1,0 +1,460 @@
+//! Commands as steps.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use super::analysis::{Analysis, Command};
+use super::deck::{Deck, Kind, Mounted};
+use super::liquids::Liquids;
+use super::node::{Node, Place};
+use super::words::{self, number};
+use crate::LeftOut;
+
+/// Heights are told to this, mm: below is what binary fractions left.
+const DUST: f64 = 1e-6;
+
+/// Where a tip aspirates by default, mm above the bottom.
+const DIP: f64 = 1.0;
+
+/// Where it touches the wall by default, mm from the rim.
+const TOUCH: f64 = -1.0;
+
+/// How commands call the bin.
+const TRASH: &str = "fixedTrash";
+
+/// Commands on their way to steps.
+pub(super) struct Steps<'a> {
+    analysis: &'a Analysis,
+    deck: &'a Deck,
+    pub(super) nodes: Vec<Node>,
+    pub(super) left_out: Vec<LeftOut>,
+    pub(super) liquids: Liquids,
+    /// By pipette, where it was moved to last: labware, well, and mm above the rim.
+    moved: BTreeMap<String, (String, String, f64)>,
+    /// Tips that were taken, by rack.
+    taken: BTreeMap<String, BTreeSet<String>>,
+    /// Modules that shake.
+    shaking: BTreeSet<String>,
+    /// The flow rates of each pipette that hold where a step says nothing, uL/s.
+    flows: BTreeMap<String, [f64; 3]>,
+}
+
+/// What flows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Flow {
+    In,
+    Out,
+    Blow,
+}
+
+impl<'a> Steps<'a> {
+    pub(super) fn new(
+        analysis: &'a Analysis,
+        deck: &'a Deck,
+        flows: BTreeMap<String, [f64; 3]>,
+        liquids: Liquids,
+    ) -> Self {
+        Steps {
+            analysis,
+            deck,
+            nodes: Vec::new(),
+            left_out: Vec::new(),
+            liquids,
+            moved: BTreeMap::new(),
+            taken: BTreeMap::new(),
+            shaking: BTreeSet::new(),
+            flows,
+        }
+    }
+
+    /// Takes the next command; `index` counts from 1.
+    pub(super) fn take(&mut self, index: usize, command: &Command) {
+        if let Err(why) = self.step(command) {
+            let name = command.command_type.clone();
+            self.nodes.push(Node::plain(format!("// not imported: {name}, as {why}")));
+            self.left_out.push(LeftOut { line: index, name, why });
+        }
+    }
+
+    fn say(&mut self, text: impl Into<String>) -> Result<(), String> {
+        self.nodes.push(Node::plain(text));
+        Ok(())
+    }
+
+    fn step(&mut self, command: &Command) -> Result<(), String> {
+        let text = |name: &str| command.text(name);
+        match command.command_type.as_str() {
+            "pickUpTip" => self.pick_up(command),
+            "dropTip" if text("labwareId") == TRASH => self.drop(command),
+            "dropTip" => self.give_back(command),
+            // The drop that follows says it.
+            "moveToAddressableAreaForDropTip" | "moveToAddressableArea" if text("addressableAreaName") == TRASH => {
+                Ok(())
+            }
+            "dropTipInPlace" => self.drop(command),
+            "aspirate" | "dispense" if command.number("volume") == Some(0.0) => self.move_to(command),
+            "aspirate" => self.aspirate(command),
+            "dispense" => self.dispense(command),
+            "blowout" => self.blow_out(command),
+            "touchTip" => self.touch(command),
+            "moveToWell" => self.move_to(command),
+            "airGapInPlace" | "aspirateInPlace" => self.air(command),
+            "waitForDuration" => {
+                self.message(command);
+                self.say(format!("wait {}", duration(command.number("seconds").unwrap_or(0.0))))
+            }
+            "waitForResume" | "pause" => {
+                let message = text("message");
+                self.say(format!("ask {}", words::text(if message.is_empty() { "Go on?" } else { message })))
+            }
+            "comment" => {
+                self.message(command);
+                Ok(())
+            }
+            "home" => self.home(command),
+            "setRailLights" => self.say(if command.params["on"] == true { "light ot2" } else { "dim ot2" }),
+            "setTipState" => self.refill(command),
+            name => self.module(name, command),
+        }
+    }
+
+    fn message(&mut self, command: &Command) {
+        let message = command.text("message");
+        if !message.trim().is_empty() {
+            self.nodes.push(Node::plain(format!("note {}", words::text(message))));
+        }
+    }
+
+    fn pipette(&self, command: &Command) -> Result<(&'a Mounted, String), String> {
+        let mounted = self.deck.pipettes.get(command.text("pipetteId")).ok_or("its pipette is not imported")?;
+        Ok((mounted, format!("ot2.{}", mounted.mount)))
+    }
+
+    /// What a command goes to, with how far above the rim, mm.
+    fn place(&self, command: &Command) -> Result<(Place, f64, f64), String> {
+        let (mounted, _) = self.pipette(command)?;
+        let labware = self.deck.labware.get(command.text("labwareId")).ok_or("its labware is not imported")?;
+        let well = command.text("wellName");
+        let place = self.deck.reached(mounted.pipette.channels, labware, well)?;
+        let depth = labware.wells.get(well).map_or(0.0, |well| well.depth);
+        let location = &command.params["wellLocation"];
+        let z = location["offset"]["z"].as_f64().unwrap_or(0.0);
+        let above = match location["origin"].as_str() {
+            Some("bottom") => z - depth,
+            Some("center") => z - depth / 2.0,
+            None | Some("top" | "default") => z,
+            Some(other) => return Err(format!("a place is told from the {other}")),
+        };
+        Ok((place, above, depth))
+    }
+
+    /// Options of a step, in braces.
+    fn options(&self, command: &Command, flow: Option<Flow>, more: &[String]) -> String {
+        let mut all: Vec<String> = more.to_vec();
+        let rate = command.number("flowRate");
+        if let (Some(flow), Some(rate)) = (flow, rate)
+            && let Some(usual) = self.flows.get(command.text("pipetteId")).map(|flows| flows[flow as usize])
+            && (rate - usual).abs() > 1e-9 * usual
+        {
+            all.push(format!("rate: {} uL/s", number(rate)));
+        }
+        for axis in ["x", "y"] {
+            let off = command.params["wellLocation"]["offset"][axis].as_f64().unwrap_or(0.0);
+            if off.abs() > DUST {
+                all.push(format!("{axis}: {} mm", number(off)));
+            }
+        }
+        if all.is_empty() { String::new() } else { format!(" {{ {} }}", all.join(", ")) }
+    }
+
+    fn pick_up(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let (place, ..) = self.place(command)?;
+        let rack = command.text("labwareId").to_owned();
+        let labware = self.deck.labware.get(&rack).ok_or("its rack is not imported")?;
+        if labware.kind != Kind::Tips {
+            return Err(format!("`{}` is no rack of tips", labware.name));
+        }
+        let wells = self.deck.wells_of(&place);
+        let taken = self.taken.entry(rack).or_default();
+        let next = labware.order.iter().find(|well| !taken.contains(*well));
+        let in_order = next.is_some_and(|next| wells.first() == Some(next)) && taken.len() % wells.len() == 0;
+        taken.extend(wells);
+        self.liquids.empty(command.text("pipetteId"));
+        self.moved.remove(command.text("pipetteId"));
+        match in_order {
+            true => self.say(format!("pick up tip from {} by {by}", place.of)),
+            false => {
+                self.nodes.push(Node::about("pick up tip ", place, &format!(" by {by}")));
+                Ok(())
+            }
+        }
+    }
+
+    fn drop(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        self.liquids.empty(command.text("pipetteId"));
+        self.say(format!("drop tip by {by}"))
+    }
+
+    fn give_back(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let (place, ..) = self.place(command)?;
+        self.liquids.empty(command.text("pipetteId"));
+        self.nodes.push(Node::about("return tip to ", place, &format!(" by {by}")));
+        Ok(())
+    }
+
+    fn aspirate(&mut self, command: &Command) -> Result<(), String> {
+        let (mounted, by) = self.pipette(command)?;
+        let volume = command.number("volume").unwrap_or(0.0);
+        let id = command.text("pipetteId").to_owned();
+        let (place, above, depth) = self.place(command)?;
+        // What is aspirated above the rim is air.
+        if above > DUST {
+            let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned());
+            let is_there = self.moved.get(&id).is_some_and(|(labware, well, height)| {
+                (labware, well) == (&here.0, &here.1) && (height - above).abs() < DUST
+            });
+            if !is_there {
+                let at = height(above, depth, None);
+                self.nodes.push(Node::about(&format!("move {by} to "), place, &at));
+                self.moved.insert(id.clone(), (here.0, here.1, above));
+            }
+            self.liquids.air(&id, volume);
+            let options = self.options(command, Some(Flow::In), &[]);
+            return self.say(format!("air gap {} uL by {by}{}", number(volume), options));
+        }
+        let below = self.deck.held_below(&place, above + depth);
+        let how = (mounted.pipette.channels, below);
+        let lacks = self.liquids.aspirate(&id, volume, how, &place.of, &self.deck.wells_of(&place));
+        let more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
+        let options = self.options(command, Some(Flow::In), &more);
+        let behind = format!(" by {by}{}{options}", height(above, depth, Some(DIP - depth)));
+        self.nodes.push(Node::about(&format!("aspirate {} uL from ", number(volume)), place, &behind));
+        self.note_place(command, above);
+        Ok(())
+    }
+
+    fn dispense(&mut self, command: &Command) -> Result<(), String> {
+        let (mounted, by) = self.pipette(command)?;
+        let volume = command.number("volume").unwrap_or(0.0);
+        let id = command.text("pipetteId").to_owned();
+        if command.text("labwareId") == TRASH {
+            self.liquids.dispense(&id, volume, mounted.pipette.channels, "", &[]);
+            let options = self.options(command, Some(Flow::Out), &[]);
+            return self.say(format!("dispense {} uL into ot2.trash[A1] by {by}{options}", number(volume)));
+        }
+        let (place, above, depth) = self.place(command)?;
+        self.liquids.dispense(&id, volume, mounted.pipette.channels, &place.of, &self.deck.wells_of(&place));
+        let behind =
+            format!(" by {by}{}{}", height(above, depth, Some(0.0)), self.options(command, Some(Flow::Out), &[]));
+        self.nodes.push(Node::about(&format!("dispense {} uL into ", number(volume)), place, &behind));
+        self.note_place(command, above);
+        Ok(())
+    }
+
+    fn blow_out(&mut self, command: &Command) -> Result<(), String> {
+        let (mounted, by) = self.pipette(command)?;
+        let id = command.text("pipetteId").to_owned();
+        if command.text("labwareId") == TRASH {
+            self.liquids.blow_out(&id, mounted.pipette.channels, "", &[]);
+            let options = self.options(command, Some(Flow::Blow), &[]);
+            return self.say(format!("blow out into ot2.trash[A1] by {by}{options}"));
+        }
+        let (place, above, depth) = self.place(command)?;
+        self.liquids.blow_out(&id, mounted.pipette.channels, &place.of, &self.deck.wells_of(&place));
+        let behind =
+            format!(" by {by}{}{}", height(above, depth, Some(0.0)), self.options(command, Some(Flow::Blow), &[]));
+        self.nodes.push(Node::about("blow out into ", place, &behind));
+        self.note_place(command, above);
+        Ok(())
+    }
+
+    fn touch(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let (place, above, depth) = self.place(command)?;
+        let mut more = Vec::new();
+        let radius = command.number("radius").unwrap_or(1.0);
+        if (radius - 1.0).abs() > 1e-9 {
+            more.push(format!("radius: {}", number(radius)));
+        }
+        let speed = command.number("speed").unwrap_or(60.0);
+        if (speed - 60.0).abs() > 1e-9 {
+            more.push(format!("speed: {} mm/s", number(speed)));
+        }
+        let behind = format!(" by {by}{}{}", height(above, depth, Some(TOUCH)), self.options(command, None, &more));
+        self.nodes.push(Node::about("touch tip to ", place, &behind));
+        self.note_place(command, above);
+        Ok(())
+    }
+
+    fn move_to(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let (place, above, depth) = self.place(command)?;
+        let mut more = Vec::new();
+        if let Some(speed) = command.number("speed") {
+            more.push(format!("speed: {} mm/s", number(speed)));
+        }
+        if command.params["forceDirect"] == true {
+            more.push("direct: true".to_owned());
+        }
+        if let Some(clear) = command.number("minimumZHeight") {
+            more.push(format!("clear: {} mm", number(clear)));
+        }
+        let behind = format!("{}{}", height(above, depth, Some(0.0)), self.options(command, None, &more));
+        self.nodes.push(Node::about(&format!("move {by} to "), place, &behind));
+        self.note_place(command, above);
+        Ok(())
+    }
+
+    fn note_place(&mut self, command: &Command, above: f64) {
+        let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned(), above);
+        self.moved.insert(command.text("pipetteId").to_owned(), here);
+    }
+
+    fn air(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let volume = command.number("volume").unwrap_or(0.0);
+        let id = command.text("pipetteId").to_owned();
+        if self.moved.get(&id).is_some_and(|(_, _, above)| *above < 0.0) {
+            return Err("it aspirates where the tip is, in a well".to_owned());
+        }
+        self.liquids.air(&id, volume);
+        let options = self.options(command, Some(Flow::In), &[]);
+        self.say(format!("air gap {} uL by {by}{options}", number(volume)))
+    }
+
+    fn home(&mut self, command: &Command) -> Result<(), String> {
+        let Some(axes) = command.params["axes"].as_array() else { return self.say("home ot2") };
+        let axes: BTreeSet<&str> = axes.iter().filter_map(Value::as_str).collect();
+        for mount in ["left", "right"] {
+            let [up, plunger] = ["Z", "Plunger"].map(|axis| format!("{mount}{axis}"));
+            if axes == BTreeSet::from([up.as_str(), plunger.as_str()]) {
+                return self.say(format!("home ot2.{mount}"));
+            }
+            if axes == BTreeSet::from([plunger.as_str()]) {
+                return self.say(format!("home plunger ot2.{mount}"));
+            }
+        }
+        let axes: Vec<&str> = axes.into_iter().collect();
+        Err(format!("the language sends a robot or a pipette home, not {}", axes.join(", ")))
+    }
+
+    fn refill(&mut self, command: &Command) -> Result<(), String> {
+        let id = command.text("labwareId");
+        let rack = self.deck.labware.get(id).ok_or("its rack is not imported")?;
+        let wells = command.params["wellNames"].as_array().map_or(0, Vec::len);
+        if command.text("tipWellState") != "clean" || wells != rack.wells.len() {
+            return Err("only a whole rack is refilled".to_owned());
+        }
+        self.taken.remove(id);
+        self.say(format!("refill {}", rack.name))
+    }
+
+    fn module(&mut self, command_type: &str, command: &Command) -> Result<(), String> {
+        let known = |id: &str| self.deck.modules.get(id).map(|module| module.name.clone());
+        let Some((_, verb)) = command_type.split_once('/') else {
+            return Err("the language has no such step".to_owned());
+        };
+        let name = known(command.text("moduleId")).ok_or("its module is not imported")?;
+        let celsius = command.number("celsius").map(number).unwrap_or_default();
+        match verb {
+            "setTargetTemperature" => self.say(format!("heat {name} to {celsius} degC")),
+            "waitForTemperature" if celsius.is_empty() => self.say(format!("settle {name}")),
+            "deactivate" | "deactivateHeater" => self.say(format!("stop heating {name}")),
+            "engage" => {
+                let height = command.number("height").ok_or("it does not say how high")?;
+                self.say(format!("engage {name} at {} mm", number(height)))
+            }
+            "disengage" => self.say(format!("disengage {name}")),
+            "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
+                Err("it holds its temperature for a time".to_owned())
+            }
+            "setTargetBlockTemperature" => self.say(format!("heat {name} to {celsius} degC")),
+            "waitForBlockTemperature" => self.say(format!("settle {name}")),
+            "deactivateBlock" => self.say(format!("stop heating {name}")),
+            "setTargetLidTemperature" => self.say(format!("heat lid {name} to {celsius} degC")),
+            "waitForLidTemperature" => self.say(format!("settle lid {name}")),
+            "deactivateLid" => self.say(format!("stop heating lid {name}")),
+            "openLid" => self.say(format!("open lid {name}")),
+            "closeLid" => self.say(format!("close lid {name}")),
+            "setAndWaitForShakeSpeed" => {
+                let rpm = command.number("rpm").ok_or("it does not say how fast")?;
+                self.shaking.insert(name.clone());
+                self.say(format!("shake {name} at {} rpm", number(rpm)))
+            }
+            "deactivateShaker" if !self.shaking.remove(&name) => Err("it does not shake".to_owned()),
+            "deactivateShaker" => self.say(format!("stop shaking {name}")),
+            "openLabwareLatch" => self.say(format!("open latch {name}")),
+            "closeLabwareLatch" => self.say(format!("close latch {name}")),
+            _ => Err("the language has no such step of this module".to_owned()),
+        }
+    }
+
+    /// What liquids wells hold at the start, by labware and well: volume in uL and name.
+    pub(super) fn loaded(&self, commands: &[Command]) -> BTreeMap<(String, String), (f64, String)> {
+        let mut out = BTreeMap::new();
+        for command in commands.iter().filter(|c| c.command_type == "loadLiquid") {
+            let Some(labware) = self.deck.labware.get(command.text("labwareId")) else { continue };
+            let Value::Object(volumes) = &command.params["volumeByWell"] else { continue };
+            let name = self.analysis.liquid(command.text("liquidId")).unwrap_or("liquid");
+            for (well, volume) in volumes {
+                let key = (labware.name.clone(), well.clone());
+                out.insert(key, (volume.as_f64().unwrap_or(0.0), name.to_owned()));
+            }
+        }
+        out
+    }
+}
+
+/// ` at bottom + 2 mm`, from where the number is round; nothing where that is usual.
+fn height(above: f64, depth: f64, usual: Option<f64>) -> String {
+    if usual.is_some_and(|usual| (usual - above).abs() < DUST) {
+        return String::new();
+    }
+    let from = [("bottom", above + depth), ("top", above), ("middle", above + depth / 2.0)];
+    let is_round = |height: f64, step: f64| ((height / step).round() * step - height).abs() < DUST;
+    let round = [1.0, 0.1, 0.01].iter().find_map(|step| from.iter().find(|(_, height)| is_round(*height, *step)));
+    let (word, height) = *round.unwrap_or(&from[0]);
+    // Ten millionths of a millimetre are dust.
+    let height = (height * 1e7).round() / 1e7;
+    match height {
+        h if h.abs() < DUST => format!(" at {word}"),
+        h if h < 0.0 => format!(" at {word} - {} mm", number(-h)),
+        h => format!(" at {word} + {} mm", number(h)),
+    }
+}
+
+/// A time in the largest unit in which it is whole.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s >= 3600.0 && s % 3600.0 == 0.0 => format!("{} h", number(s / 3600.0)),
+        s if s >= 60.0 && s % 60.0 == 0.0 => format!("{} min", number(s / 60.0)),
+        s => format!("{} s", number(s)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_are_told_from_where_they_are_round() {
+        assert_eq!(height(2.0 - 10.67, 10.67, Some(1.0 - 10.67)), " at bottom + 2 mm");
+        assert_eq!(height(1.0 - 10.67, 10.67, Some(1.0 - 10.67)), "");
+        assert_eq!(height(-1.0, 10.67, None), " at top - 1 mm");
+        assert_eq!(height(5.0, 10.67, None), " at top + 5 mm");
+        assert_eq!(height(-5.335, 10.67, None), " at middle");
+        assert_eq!(height(-10.67, 10.67, None), " at bottom");
+    }
+
+    #[test]
+    fn durations_are_told_in_whole_units() {
+        assert_eq!(
+            [duration(120.0), duration(90.0), duration(7200.0), duration(0.5)],
+            ["2 min", "90 s", "2 h", "0.5 s"]
+        );
+    }
+}
