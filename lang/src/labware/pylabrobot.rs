@@ -94,7 +94,7 @@ impl Resource {
             }
             "container_rack" | "tube_rack" => Ok("TubeRack"),
             _ if !wells.is_empty() && !self.children.iter().any(holders) => Ok("WellPlate"),
-            _ => Err(format!("a `{}` of PyLabRobot is no plate, rack, trough, adapter or lid", self.class)),
+            _ => Err(format!("`{}` of PyLabRobot is not a plate, rack, trough, adapter or lid", self.class)),
         }
     }
 
