@@ -165,7 +165,8 @@ module.exports = grammar({
     type_arguments: ($) => seq('<', $._name, repeat(seq('&', $._name)), optional($.type_arguments), '>'),
     parameters: ($) => seq('(', nl($), optional(listed($, $.parameter)), ')'),
     parameter: ($) => seq(
-      field('name', $.identifier), optional(seq(':', nl($), field('type', $.type))), optional(seq('=', nl($), field('default', $.expression))),
+      field('name', $.identifier), optional(seq(':', nl($), field('type', $.type))), optional(seq('of', nl($), field('of', $.identifier))),
+      optional(seq('=', nl($), field('default', $.expression))),
     ),
     _signature: ($) => signature_of($, $.verb),
     verb: ($) => seq(optional('return'), repeat1($.identifier)),
@@ -343,9 +344,10 @@ module.exports = grammar({
       optional(seq('with', nl($), $._operand)),
     ),
     _clause: ($) => seq(optional($._nl_clause), choice(
-      $.needs, $.presumes, $.while_clause, $.fails, $.effect, $.takes, $.until, $.option_clause, $.says, $.moves, $.grips, $.frees, $.leads,
+      $.needs, $.presumes, $.warns, $.while_clause, $.fails, $.effect, $.takes, $.until, $.option_clause, $.says, $.moves, $.grips, $.frees, $.leads,
     )),
     needs: ($) => seq('needs', field('condition', $.expression), optional($.refusal)),
+    warns: ($) => seq('warns', field('condition', $.expression), optional($.refusal)),
     presumes: ($) => seq('presumes', optional('ever'), field('condition', $.expression), optional($.refusal)),
     refusal: ($) => seq(
       'else', field('failure', alias($._any_word, $.failure)), optional($.string),

@@ -53,6 +53,7 @@ mod pages;
 mod physique;
 mod pipeline_tests;
 mod plan;
+mod protocols;
 mod reacting;
 mod recorded;
 mod reference;

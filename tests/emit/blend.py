@@ -25,7 +25,7 @@ def run(protocol):
     ot2_left.flow_rate.dispense = 94
     ot2_left.dispense(90, plate["A1"].top(0))
     ot2_left.aspirate(40, plate["A1"].bottom(1))
-    ot2_left.dispense(40, plate["A1"].top(0))
+    ot2_left.dispense(40, plate["A1"].top(-9.67))
     ot2_left.drop_tip(protocol.fixed_trash)
     # blend.mtx:22: pick up tip small[A3] by ot2.right
     ot2_right.pick_up_tip(small["A3"])

@@ -27,7 +27,7 @@
 (role) @keyword.storage
 [ "view" "command" "frame" "solid" "joint" "include" "between" "keeps" "ends" "slides" "turns" "pitch" "holding" ] @keyword
 [
-  "needs" "presumes" "ever" "fails" "effect" "each" "takes" "option" "says" "moves" "grips" "frees" "leads" "because" "straight" "driving"
+  "needs" "presumes" "warns" "ever" "fails" "effect" "each" "takes" "option" "says" "moves" "grips" "frees" "leads" "because" "straight" "driving"
   "upright" "tilted" "about" "home" "joints"
 ] @keyword
 [

@@ -18,7 +18,7 @@ static const char GOES_ON[] =
     " fails effect takes sends asks expects ";
 
 // With these a line goes on where they are expected.
-static const char CLAUSES[] = " option says moves grips frees leads ";
+static const char CLAUSES[] = " warns option says moves grips frees leads ";
 static const char MORE[] = " straight driving upright tilted home about when because within also labelled pitch noise for over ";
 
 static const char LABELS[] = " to from into onto on in with by at using through as ";

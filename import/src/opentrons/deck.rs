@@ -126,7 +126,7 @@ impl Deck {
         let on = self.place_of(&command.params["location"])?;
         let category = definition["metadata"]["displayCategory"].as_str().unwrap_or("wellPlate");
         let kind = if definition["parameters"]["isTiprack"] == true { Kind::Tips } else { Kind::Wells };
-        let asset = match library.labware(load_name) {
+        let asset = match library.labware(&format!("{load_name}/{version}")) {
             Some(asset) if space == OWN => {
                 self.used.insert(asset.to_owned());
                 asset.to_owned()
@@ -145,7 +145,7 @@ impl Deck {
     /// The asset of a definition that the library has no name for.
     fn asset_of(&mut self, load_name: &str, space: &str, version: u64, definition: &Value) -> String {
         let from = match space == OWN {
-            true => load_name.to_owned(),
+            true => format!("{load_name}/{version}"),
             false => {
                 let file = format!("{space}_{load_name}_{version}.json");
                 self.files.insert(file.clone(), format!("{definition:#}\n"));

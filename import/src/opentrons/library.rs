@@ -40,12 +40,12 @@ impl Library {
             if let Some((kind, definition)) = source
                 && kind.text == "labware"
             {
-                out.labware.insert(definition.text.trim_end_matches(".json").to_owned(), asset.clone());
+                out.labware.insert(definition.text.clone(), asset.clone());
             }
             if let Some(uri) = field("definition").and_then(text)
-                && let [_, load_name, _] = uri.split('/').collect::<Vec<_>>()[..]
+                && let Some((_, named)) = uri.split_once('/')
             {
-                out.labware.insert(load_name.to_owned(), asset.clone());
+                out.labware.insert(named.to_owned(), asset.clone());
             }
             let Some(model) = field("model").and_then(text) else { continue };
             match field("flow").and_then(quantity) {
@@ -73,9 +73,9 @@ impl Library {
         self.modules.get(model).map(String::as_str)
     }
 
-    /// The asset of a definition.
-    pub(super) fn labware(&self, load_name: &str) -> Option<&str> {
-        self.labware.get(load_name).map(String::as_str)
+    /// The asset of a definition, `NAME/VERSION`.
+    pub(super) fn labware(&self, named: &str) -> Option<&str> {
+        self.labware.get(named).map(String::as_str)
     }
 }
 

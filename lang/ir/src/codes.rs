@@ -146,6 +146,8 @@ codes! {
     NO_SAFE "no-safe" "N0" "a driver has no `safe` line, but its device can be left on";
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a volume below the smallest volume of a pipette";
+    ABOVE_LIQUID "above-liquid" "V3" "a tip aspirates above the surface of the liquid";
+    OUTSIDE_WELL "outside-well" "V3" "a height outside of the well";
     TIP_OVERFLOW "tip-overflow" "V3" "a tip would aspirate more than it holds";
     NEVER_FILLED "never-filled" "V2" "liquid is taken from an empty vessel";
     OUT_OF_TIPS "out-of-tips" "V4" "a rack has no fresh tip left";

@@ -176,7 +176,8 @@ impl Interpreter<'_, '_> {
             None => format!("`{label}` has no effect: it presumes `{}`, which was never true", presumed.text),
         };
         let severity = warns.then_some(Severity::Warning);
-        self.demand(what, "this step is unnecessary", presumed, facts, (false, severity));
+        let so = if warns { "this step goes wrong" } else { "this step is unnecessary" };
+        self.demand(what, so, presumed, facts, (false, severity));
     }
 
     /// A demand that does not hold: in its own words where it has them, which a label at the step then says the consequence of.
