@@ -144,7 +144,7 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
         let Some(format) = FORMATS.iter().find(|f| f.word == word.text) else { continue };
         let read = source_text(file, &word.text, &path.text, loader).and_then(|text| {
             (format.read)(&text, path, &mut beside)
-                .map_err(|reason| format!("`{}` is no {}: {reason}", path.text, format.holds).into())
+                .map_err(|reason| format!("`{}` is not a {}: {reason}", path.text, format.holds).into())
         });
         match read {
             Ok((given, kind)) => {

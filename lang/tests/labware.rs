@@ -230,9 +230,9 @@ fn a_file_that_is_no_labware_says_why() {
     let endless =
         r#"{"name":"c","type":"Trough","size_x":1,"size_y":1,"size_z":1,"category":"trough","max_volume":"Infinity"}"#;
     for (text, wanted) in [
-        (carrier, "a `PlateCarrier` of PyLabRobot is no plate, rack, trough, adapter or lid"),
-        (rack, "it holds no tubes: assign tubes to its places"),
-        (endless, "`c` has no `max_volume` in numbers"),
+        (carrier, "`PlateCarrier` of PyLabRobot is not a plate, rack, trough, adapter or lid"),
+        (rack, "it has no tubes: assign tubes to its places"),
+        (endless, "the `max_volume` of `c` is not a number"),
         ("[1, 2]", "it has no `schemaVersion`"),
         ("", "it is not JSON"),
     ] {

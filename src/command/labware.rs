@@ -60,7 +60,7 @@ fn missing(name: &str) -> Exit {
             let versions: Vec<String> = versions.iter().map(u32::to_string).collect();
             format!("it has version {}", joined(&versions, "and"))
         }
-        _ => "give words that stand in a name: `matterixc labware nest 96`; without any it lists all".to_owned(),
+        _ => "give words of a name: `matterixc labware nest 96`; without words it lists all".to_owned(),
     };
     print(Stream::Err, &format!("help: {help}\n"));
     Exit::Findings

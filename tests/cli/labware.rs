@@ -99,7 +99,7 @@ fn words_are_looked_for_in_names_titles_and_kinds() {
     for (words, help) in [
         (&["biorad_96_wellplate_200ul_pcl"][..], "did you mean `biorad_96_wellplate_200ul_pcr`"),
         (&["axygen_1_reservoir_90ml/7"], "it has version 1, 2 and 3"),
-        (&["nothing", "of", "the", "sort"], "give words that stand in a name"),
+        (&["nothing", "of", "the", "sort"], "give words of a name"),
     ] {
         let ended = matterixc(&[&["labware"], words].concat());
         assert!(ended.code == 1 && ended.out.is_empty() && ended.err.contains(help), "{words:?}: {}", ended.err);

@@ -28,8 +28,8 @@ pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let (protocol, warnings) = protocol(subject, performance)?;
     let beyond = |c: &&protocol::Command| c.name == "setTipState" || c.text("labwareId") == deck::BIN;
     if let Some(command) = protocol.commands.iter().find(beyond) {
-        let headline = format!("{WHAT} in JSON neither refills a rack nor dispenses into the bin");
-        let d = not_expressible(command.at, headline, "is told this").help("write it as `--target opentrons-python`");
+        let headline = format!("{WHAT} in JSON cannot refill a rack or dispense into the bin");
+        let d = not_expressible(command.at, headline, "this step sends it").help("use `--target opentrons-python`");
         return Err(vec![d]);
     }
     Ok((json::write(&protocol), warnings))

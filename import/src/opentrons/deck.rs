@@ -170,7 +170,7 @@ impl Deck {
         if let Some(under) = location["labwareId"].as_str().and_then(|id| self.labware.get(id)) {
             return Ok(under.name.clone());
         }
-        Err("it stands on no place of the deck".to_owned())
+        Err("it is not on a slot of the deck".to_owned())
     }
 
     /// What a pipette with several channels reaches from a well, or why it is nothing that can be said.

@@ -31,7 +31,7 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
     let analysis = Analysis::read(text)?;
     if let Some(index) = analysis.commands.iter().position(|c| c.command_type == "custom") {
         let why = format!(
-            "command {} is only a remark: below API level 2.14 an analysis does not say heights, air gaps and what modules do; analyse the protocol at level 2.14 or above",
+            "command {} is only a comment: below API level 2.14 an analysis lacks heights, air gaps and steps of modules; analyse the protocol at level 2.14 or above",
             index + 1
         );
         return Err(Mistake { line: 0, why });
@@ -59,7 +59,7 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
     let text = page.text(&analysis, title, &folded(nodes));
     let text = format(FileId(0), &text).map_err(|found| {
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
-        Mistake { line: 0, why: format!("the text made of it cannot be read: {why}") }
+        Mistake { line: 0, why: format!("the written file cannot be read: {why}") }
     })?;
     Ok(Imported { text, left_out, files: deck.files.clone().into_iter().collect() })
 }
@@ -150,7 +150,7 @@ impl Page<'_> {
         for (liquid, words) in &liquids {
             let _ = writeln!(
                 out,
-                "\n/// {words}: taken for water, as the protocol does not say what is in it.\nsolution {words_name} {{ water: 100 %w/w }}",
+                "\n/// {words}: assumed to be water, because the protocol does not give its contents.\nsolution {words_name} {{ water: 100 %w/w }}",
                 words_name = liquid
             );
         }

@@ -144,7 +144,7 @@ impl<'a> Steps<'a> {
             Some("bottom") => z - depth,
             Some("center") => z - depth / 2.0,
             None | Some("top" | "default") => z,
-            Some(other) => return Err(format!("a place is told from the {other}")),
+            Some(other) => return Err(format!("a height from the {other} is not supported")),
         };
         Ok((place, above, depth))
     }
@@ -174,7 +174,7 @@ impl<'a> Steps<'a> {
         let rack = command.text("labwareId").to_owned();
         let labware = self.deck.labware.get(&rack).ok_or("its rack is not imported")?;
         if labware.kind != Kind::Tips {
-            return Err(format!("`{}` is no rack of tips", labware.name));
+            return Err(format!("`{}` is not a tip rack", labware.name));
         }
         let wells = self.deck.wells_of(&place);
         let taken = self.taken.entry(rack).or_default();
@@ -319,7 +319,7 @@ impl<'a> Steps<'a> {
         let volume = command.number("volume").unwrap_or(0.0);
         let id = command.text("pipetteId").to_owned();
         if self.moved.get(&id).is_some_and(|(_, _, above)| *above < 0.0) {
-            return Err("it aspirates where the tip is, in a well".to_owned());
+            return Err("it aspirates at the position of the tip, in a well".to_owned());
         }
         self.liquids.air(&id, volume);
         let options = self.options(command, Some(Flow::In), &[]);
@@ -339,7 +339,7 @@ impl<'a> Steps<'a> {
             }
         }
         let axes: Vec<&str> = axes.into_iter().collect();
-        Err(format!("the language sends a robot or a pipette home, not {}", axes.join(", ")))
+        Err(format!("the language can home a robot or a pipette, but not {}", axes.join(", ")))
     }
 
     fn refill(&mut self, command: &Command) -> Result<(), String> {
@@ -365,12 +365,12 @@ impl<'a> Steps<'a> {
             "waitForTemperature" if celsius.is_empty() => self.say(format!("settle {name}")),
             "deactivate" | "deactivateHeater" => self.say(format!("stop heating {name}")),
             "engage" => {
-                let height = command.number("height").ok_or("it does not say how high")?;
+                let height = command.number("height").ok_or("it gives no height")?;
                 self.say(format!("engage {name} at {} mm", number(height)))
             }
             "disengage" => self.say(format!("disengage {name}")),
             "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
-                Err("it holds its temperature for a time".to_owned())
+                Err("it holds a temperature for a time".to_owned())
             }
             "setTargetBlockTemperature" => self.say(format!("heat {name} to {celsius} degC")),
             "waitForBlockTemperature" => self.say(format!("settle {name}")),
@@ -381,7 +381,7 @@ impl<'a> Steps<'a> {
             "openLid" => self.say(format!("open lid {name}")),
             "closeLid" => self.say(format!("close lid {name}")),
             "setAndWaitForShakeSpeed" => {
-                let rpm = command.number("rpm").ok_or("it does not say how fast")?;
+                let rpm = command.number("rpm").ok_or("it gives no speed")?;
                 self.shaking.insert(name.clone());
                 self.say(format!("shake {name} at {} rpm", number(rpm)))
             }

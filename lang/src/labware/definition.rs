@@ -75,16 +75,16 @@ impl Definition {
     /// The same if its sizes can be those of a thing, or in words why not.
     pub(super) fn checked(self) -> Result<Definition, String> {
         if self.size.is_some_and(|size| size.iter().any(|s| !above_nothing(*s))) {
-            return Err("its outer dimensions are not above 0".into());
+            return Err("its outer dimensions must be above 0".into());
         }
         for (name, well) in &self.wells {
             if Place::parse(name).is_none() {
-                return Err(format!("`{name}` is not a place such as `A1`"));
+                return Err(format!("`{name}` is not the name of a well such as `A1`"));
             }
             let open = well.opening.is_none_or(|opening| opening.sizes().iter().all(|s| above_nothing(*s)));
             let known = well.at.iter().chain(&well.reach).all(|v| v.is_finite());
             if !(open && known && well.depth >= 0.0 && well.depth.is_finite() && above_nothing(well.volume)) {
-                return Err(format!("the size of `{name}` is not above 0"));
+                return Err(format!("the size of `{name}` must be above 0"));
             }
         }
         Ok(self)

@@ -29,8 +29,8 @@ impl Entry {
     /// The definition as JSON without blanks.
     pub fn text(&self) -> Result<String, String> {
         let bytes = decompress_to_vec_with_limit(self.packed, self.whole);
-        let bytes = bytes.map_err(|e| format!("the library's `{}` cannot be unpacked ({e})", self.name))?;
-        String::from_utf8(bytes).map_err(|e| format!("the library's `{}` is no text ({e})", self.name))
+        let bytes = bytes.map_err(|e| format!("`{}` of the library cannot be unpacked ({e})", self.name))?;
+        String::from_utf8(bytes).map_err(|e| format!("`{}` of the library is not text ({e})", self.name))
     }
 }
 

@@ -133,7 +133,7 @@ enum Form {
 pub(super) fn read(value: serde_json::Value) -> Result<Definition, String> {
     match value.get("schemaVersion").and_then(serde_json::Value::as_u64) {
         Some(2 | 3) => {}
-        Some(other) => return Err(format!("its schema is {other}, known are 2 and 3")),
+        Some(other) => return Err(format!("its schema is {other}, but only 2 and 3 are supported")),
         None => return Err("it has no `schemaVersion`".into()),
     }
     let file: File = serde_json::from_value(value).map_err(|e| e.to_string())?;

@@ -63,7 +63,7 @@ pub(super) fn read(value: serde_json::Value) -> Result<Definition, String> {
         let Some(well) = resource.child(child)? else { continue };
         let place = resource.place(child);
         if wells.insert(place.clone(), well).is_some() {
-            return Err(format!("two of its places are `{place}`"));
+            return Err(format!("it has the place `{place}` twice"));
         }
     }
     let has_tips = resource.children.iter().any(|child| child.is("tip_spot"));
@@ -90,11 +90,11 @@ impl Resource {
             "plate_adapter" => Ok("Adapter"),
             _ if has_tips => Ok("TipRack"),
             "container_rack" | "tube_rack" if wells.is_empty() => {
-                Err("it holds no tubes: assign tubes to its places".into())
+                Err("it has no tubes: assign tubes to its places".into())
             }
             "container_rack" | "tube_rack" => Ok("TubeRack"),
             _ if !wells.is_empty() && !self.children.iter().any(holders) => Ok("WellPlate"),
-            _ => Err(format!("a `{}` of PyLabRobot is no plate, rack, trough, adapter or lid", self.class)),
+            _ => Err(format!("`{}` of PyLabRobot is not a plate, rack, trough, adapter or lid", self.class)),
         }
     }
 
@@ -111,7 +111,7 @@ impl Resource {
     fn child(&self, child: &Resource) -> Result<Option<Well>, String> {
         let turned = |r: &Resource| r.rotation.is_some_and(|r| [r.x, r.y, r.z].iter().any(|angle| *angle != 0.0));
         if turned(child) || child.children.iter().any(turned) {
-            return Err(format!("`{}` is turned", child.name));
+            return Err(format!("`{}` is rotated", child.name));
         }
         if child.is("well") {
             return self.container(child.corner()?, child).map(Some);
@@ -149,7 +149,7 @@ impl Resource {
         Ok(Well {
             at: [x, y, z + floor],
             depth: of.size_z - floor,
-            volume: volume.ok_or_else(|| format!("`{}` has no `max_volume` in numbers", of.name))?,
+            volume: volume.ok_or_else(|| format!("the `max_volume` of `{}` is not a number", of.name))?,
             opening: Some(if round { Opening::Round(size[0].min(size[1])) } else { Opening::Square(size) }),
             inside: None,
             reach: None,
@@ -158,7 +158,7 @@ impl Resource {
 
     /// The place of a tip; the shape of the tip is not in the file.
     fn tip(&self, corner: [f64; 3], spot: &Resource) -> Result<Well, String> {
-        let tip = spot.prototype_tip.ok_or_else(|| format!("`{}` does not say its tip", spot.name))?;
+        let tip = spot.prototype_tip.ok_or_else(|| format!("`{}` gives no tip", spot.name))?;
         Ok(Well {
             at: self.middle(corner, [spot.size_x, spot.size_y]),
             depth: tip.total_tip_length,

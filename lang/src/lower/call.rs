@@ -18,6 +18,9 @@ use crate::names::{DeclId, verb_text};
 use crate::near;
 use crate::syntax::{STEP_WORDS, is_step};
 
+/// So many devices that could do a step are named where none of the lab can.
+const DEVICES_SHOWN: usize = 4;
+
 /// The arguments of a call, in the words of its signature.
 pub struct Bound {
     /// By parameter name, in order of declaration.
@@ -384,6 +387,10 @@ impl<'a> Planner<'a, '_> {
             .map(|i| self.lab.instances[i.0 as usize].name.clone())
             .take(3)
             .collect();
+        let kinds = self.lab.tables.kinds.values().filter(|k| k.is_asset && k.ancestors.contains(&owner));
+        let mut kinds: Vec<String> = kinds.map(|k| format!("`{}`", k.name)).collect();
+        kinds.sort();
+        kinds.truncate(DEVICES_SHOWN);
         let text = self.text(verb);
         let mut d = match device {
             Some(id) => {
@@ -406,6 +413,9 @@ impl<'a> Planner<'a, '_> {
             ),
         };
         d.help.extend(near::question(&able));
+        if able.is_empty() && !kinds.is_empty() {
+            d = d.help(format!("devices that can: {}", kinds.join(", ")));
+        }
         self.lab.report(d);
     }
 
