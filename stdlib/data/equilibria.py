@@ -280,11 +280,12 @@ def species(row):
 
 @functools.cache
 def heats():
-    """Heats of solution, as they are written."""
+    """Heats of solution with their sources, as they are written."""
     text = (LIBRARY / "species.mtx").read_text(encoding="utf8")
-    found = {row["name"]: f"{row['heat_of_solution']} kJ/mol" for row in table("species.csv") if row["heat_of_solution"]}
+    known = [row for row in table("species.csv") if row["heat_of_solution"]]
+    found = {row["name"]: f"{row['heat_of_solution']} kJ/mol  // [{row['heat_source'].split()[0]}]" for row in known}
     for name, body in re.findall(r"^species (\S+) \{\n(.*?)^\}", text, re.M | re.S):
-        heat = re.search(r"^    heat_of_solution: (.*? kJ/mol)", body, re.M)
+        heat = re.search(r"^    heat_of_solution: (.*? kJ/mol(?:  // \[\w+\])?)", body, re.M)
         if heat:
             found[name] = heat.group(1)
     return found

@@ -128,8 +128,9 @@ fn a_call_ends_when_its_seconds_are_over_and_says_so() {
     let mut client = Client::new(&folder("budget_call"));
     for _ in 0..5 {
         let data = client.data("check", json!({ "text": format!("mtx 1\n{BENCH}{TENS}{slow}"), "seconds": 1 }));
-        let stopped =
-            |d: &serde_json::Value| d["code"] == "budget-spent" && d["headline"].to_string().contains("stopped");
+        let stopped = |d: &serde_json::Value| {
+            d["code"] == "budget-spent" && d["headline"].to_string().contains("ran out of time")
+        };
         assert!(data["findings"].as_array().expect("findings").iter().any(stopped), "{data}");
     }
     let data = client.data("check", json!({ "text": "mtx 1\nconst a = 1\n" }));

@@ -162,7 +162,7 @@ fn what_is_put_down_beside_its_place_topples_and_handlers_take_it() {
          expect panda.holding == nothing"
     );
     let ended = from(&post("contact_toppled_handled", &lines), seed);
-    assert!(ended.code == 0 && ended.out.contains("then lies at"), "{}{}", ended.out, ended.err);
+    assert!(ended.code == 0 && ended.out.contains("leans by"), "{}{}", ended.out, ended.err);
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn what_is_not_modelled_is_said_and_check_takes_no_contact() {
     let ended = matterixc(&["check", "examples/handover.mtx", "--fidelity", "contact"]);
     assert_eq!(ended.code, 2, "{}", ended.err);
     let ended = matterixc(&["run", "examples/handover.mtx", "--fidelity", "motion", "--really", "grip=0.5"]);
-    assert!(ended.code == 2 && ended.err.contains("it needs `--fidelity contact`"), "{}", ended.err);
+    assert!(ended.code == 2 && ended.err.contains("needs `--fidelity contact`"), "{}", ended.err);
     for wrong in ["grip", "grip=-1", "force=1", ""] {
         let ended = matterixc(&["run", "examples/handover.mtx", "--fidelity", "contact", &format!("--really={wrong}")]);
         assert!(ended.code == 2 && ended.err.contains("write shares from 0 to 10"), "{wrong}: {}", ended.err);

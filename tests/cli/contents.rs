@@ -222,7 +222,7 @@ fn a_place_without_a_statement_is_a_usage_error() {
             "`examples/dilution.mtx` has no statement of a workflow at this place; the nearest are at 21",
         ),
         (&["--at", "22:1", "--contents"], "no statement"),
-        (&["examples/sn1.mtx", "--at", "20", "--contents"], "one with `--at`"),
+        (&["examples/sn1.mtx", "--at", "20", "--contents"], "`--at` needs exactly one file"),
     ];
     for (args, why) in wrong {
         let ended = matterixc(&[&["check", "examples/dilution.mtx"], *args].concat());

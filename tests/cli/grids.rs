@@ -134,7 +134,6 @@ fn what_goes_wrong_with_tips_and_volumes_has_a_name() {
         ("tip_used", format!("{pick}drop tip into bin by ot2.left\npick up tip tips[A1] by ot2.left")),
         ("tip_used", "pick up tip tips[C3] by ot2.left\nreturn tip to tips[C3] by ot2.left\npick up tip tips[C3] by ot2.left\ndrop tip by ot2.left\npick up tip tips[C3] by ot2.left".to_string()),
         ("out_of_tips", format!("for t in tips.tips {{ {pick}\ndrop tip by ot2.left }}\n{pick}")),
-        ("below_minimum", format!("{pick}aspirate 19 uL from stock[A1] by ot2.left")),
         ("tip_overflow", format!("{pick}repeat 4 times {{ aspirate 80 uL from stock[A1] by ot2.left }}")),
         ("never_filled", format!("{pick}aspirate 50 uL from stock[A3] by ot2.left")),
         ("volume_underflow", format!("{dye}aspirate 31 uL from plate[A1] by ot2.left")),

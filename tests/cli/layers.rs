@@ -95,7 +95,7 @@ fn what_cannot_be_is_refused() {
         (
             "species L { formula: \"C6H14\", heat_capacity: 200 J/(mol*K) }
 species X { formula: \"I2\", dissolved_in: L }\nequilibrium x: I2 <-> X { partition: 3 }",
-            "the density of `L` is unknown",
+            "the density of `L` is not known",
         ),
     ];
     for (before, why) in cases {

@@ -171,7 +171,7 @@ fn what_is_no_protocol_of_an_ot2_is_refused() {
         ("[]".to_owned(), "neither an analysis nor a JSON protocol"),
         (flex.to_string(), "only protocols of the OT-2"),
         (wrong.to_string(), "fails in its analysis: KeyError"),
-        (legacy.to_string(), "does not say heights"),
+        (legacy.to_string(), "lacks heights"),
     ];
     for (text, why) in cases {
         write(&dir, "a.json", text);

@@ -202,7 +202,7 @@ fn a_fit_says_what_one_temperature_cannot_tell() {
     write(&dir, "one.mtx", text.replace("first: Temperature = 45 degC", "first: Temperature = 76 degC"));
     let ended = matterixc_in(&dir, &["fit", "one.mtx"]);
     assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
-    let said = "the data do not determine `ethyl_iodide.rate.A` and `ethyl_iodide.rate.Ea` each by itself";
+    let said = "the data do not determine `ethyl_iodide.rate.A` and `ethyl_iodide.rate.Ea` separately";
     assert!(ended.out.contains(said), "{}", ended.out);
 }
 

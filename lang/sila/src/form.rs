@@ -145,7 +145,7 @@ mod tests {
         let of = |ty: &str| vec![("Set(T)".to_owned(), ty.to_owned())];
         assert_eq!(difference(&of("Real"), &of("Real")), None);
         let told = difference(&of("Real in Kelvin + 273.15"), &of("Real in Kelvin")).expect("it differs");
-        assert!(told.starts_with("`Set(T)` is `Real in Kelvin` there"), "{told}");
+        assert!(told.starts_with("`Set(T)` is `Real in Kelvin` on the server"), "{told}");
         assert!(difference(&of("Real"), &[]).is_some());
     }
 }

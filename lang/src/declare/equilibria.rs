@@ -195,6 +195,15 @@ fn check_form(
             [(s, n)] => n == 1.0 && species.get(s).liquid.is_some() == apart,
             _ => false,
         };
+        let liquid = dry_terms(species, right).first().and_then(|(s, _)| species.get(*s).liquid);
+        let is_dense =
+            |s: SpeciesId| ["density", "molar_volume"].iter().any(|key| field(species.get(s).fields, key).is_some());
+        if let Some(liquid) = liquid.filter(|liquid| !is_dense(*liquid)) {
+            let headline = format!("the density of `{}` is not known", species.get(liquid).name);
+            let label = "a partition constant compares concentrations";
+            let d = Diagnostic::error(codes::MISSING_FIELD, f.span, headline, label);
+            diagnostics.push(d.help("give the density of the liquid, or the ratio of molalities as `constant`"));
+        }
         if !is_in(left, false) || !is_in(right, true) {
             let headline =
                 "`partition` needs the equation of one species between water and another liquid: `I2 <-> I2_org`";

@@ -90,9 +90,13 @@ pub fn collect<'a>(
         let refused = |headline: String, label: &str, help: &str| {
             Diagnostic::error(codes::INTERACTION_FORM, span, headline, label).help(help)
         };
-        if let Some((s, _)) = members.iter().find(|(s, n)| *n != 1.0 || !species.get(*s).is_aqueous()) {
+        if let Some((s, n)) = members.iter().find(|(s, n)| *n != 1.0 || !species.get(*s).is_aqueous()) {
             let headline = format!("`{}` must be between dissolved species", name.text);
-            let label = format!("`{}` is not dissolved", species.get(*s).name);
+            let name = &species.get(*s).name;
+            let label = match *n == 1.0 {
+                true => format!("`{name}` is not dissolved"),
+                false => format!("`{name}` stands here with a coefficient"),
+            };
             diagnostics.push(refused(
                 headline,
                 &label,

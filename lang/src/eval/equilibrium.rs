@@ -434,7 +434,7 @@ impl<'a> Elaborator<'a> {
                     _ => self.multiple(LN_10, n.node),
                 };
                 self.note_place(ln, given.span);
-                let shift = self.per_kilogram(e, given.span)?;
+                let shift = self.per_kilogram(e)?;
                 self.graph.binary(BinaryOp::Add, ln, shift)
             }
             _ => self.multiple(-LN_10, n.node),
@@ -456,28 +456,13 @@ impl<'a> Elaborator<'a> {
 
     /// What turns the logarithm of a ratio of concentrations in two liquids into that of molalities: that of the density of water over the
     /// other one's.
-    fn per_kilogram(&mut self, e: usize, at: Span) -> Option<NodeId> {
+    fn per_kilogram(&mut self, e: usize) -> Option<NodeId> {
         let species = self.tables.equilibria[e].terms.iter().map(|(s, _)| *s);
         let liquid = species.filter_map(|s| self.tables.species.get(s).liquid).next()?;
         let water = self.tables.species.iter().map(|(s, _)| s).find(|s| self.tables.species.get(*s).is_water)?;
-        let mut logarithms = [water, liquid].into_iter().map(|s| {
-            let name = self.tables.species.get(s).name.clone();
-            let Some(density) = self.number_of(s, "density") else {
-                let headline = format!("the density of `{name}` is unknown");
-                let d = Diagnostic::error(
-                    codes::MISSING_FIELD,
-                    at,
-                    headline,
-                    "a partition constant is a ratio of concentrations",
-                );
-                self.report(d.help("give the density of the liquid, or the ratio of molalities as `constant`"));
-                return None;
-            };
-            Some(self.graph.unary(UnaryOp::Ln, density))
-        });
-        let (of_water, of_liquid) = (logarithms.next()??, logarithms.next()??);
-        drop(logarithms);
-        Some(self.graph.binary(BinaryOp::Sub, of_water, of_liquid))
+        let [of_water, of_liquid] = [water, liquid].map(|s| self.number_of(s, "density"));
+        let ratio = self.graph.binary(BinaryOp::Div, of_water?, of_liquid?);
+        Some(self.graph.unary(UnaryOp::Ln, ratio))
     }
 
     /// `log10 K = A1 + A2 T + A3 / T + A4 log10 T + A5 / T^2 + A6 T^2`, with the temperature T in K; those that are left out are 0.

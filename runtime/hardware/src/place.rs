@@ -244,7 +244,7 @@ mod tests {
             ("", "the host is missing"),
             ("300.1.1.1:80", "is not a host name or address"),
             ("a robot:80", "is not a host name or address"),
-            ("::1", "in brackets"),
+            ("::1", "needs brackets"),
             ("[robot]:80", "is not a host name or address"),
             ("https://robot:80", "`https://` is not supported here"),
             ("robot:80/runs", "`80/runs` is not a port"),

@@ -221,7 +221,10 @@ fn a_watchdog_that_may_have_tripped_does_not_and_the_plate_is_made_safe() {
     std::thread::sleep(Duration::from_millis(2000));
     let ended = resumed(&dir, "lab.toml");
     let said = flat(&ended.err);
-    assert!(ended.code == 1 && said.contains("journal-mismatch") && said.contains("its watchdog waits 6 s"), "{said}");
+    assert!(
+        ended.code == 1 && said.contains("journal-mismatch") && said.contains("longer than its watchdog waits (6 s)"),
+        "{said}"
+    );
     assert!(said.contains("these devices were made safe: `plate`"), "{said}");
 }
 

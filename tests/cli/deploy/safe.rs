@@ -250,6 +250,9 @@ fn a_watchdog_that_heard_nothing_for_too_long_ends_the_run() {
     let dir = bench("late_feed", &watched("1 s", "5 s"), "plate", &device.address);
     let ended = deploy_at("20", &dir, &["--mode", "real"]);
     let said = flat(&ended.err);
-    assert!(ended.code == 1 && said.contains("diverged") && said.contains("its watchdog waits 5 s"), "{said}");
+    assert!(
+        ended.code == 1 && said.contains("diverged") && said.contains("longer than its watchdog waits (5 s)"),
+        "{said}"
+    );
     assert!(device.heard().iter().any(|line| line == "OFF"), "{:?}", device.heard());
 }

@@ -34,7 +34,8 @@ struct Replay {
 }
 
 fn replay(spoiled: Option<(&'static str, Spoiled)>) -> Replay {
-    let recorded: Vec<Value> = RECORDED.lines().map(|l| serde_json::from_str(l).expect("recorded")).collect();
+    let mut recorded: Vec<Value> = RECORDED.lines().map(|l| serde_json::from_str(l).expect("recorded")).collect();
+    recorded.iter_mut().for_each(|e| placed(&mut e["body"]));
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
     let (wrong, left) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(recorded.len())));
@@ -49,6 +50,16 @@ fn replay(spoiled: Option<(&'static str, Spoiled)>) -> Replay {
     Replay { address, wrong, left }
 }
 
+/// Writes out how far a place in a well is from its origin: what is left out is none.
+fn placed(body: &mut Value) {
+    if let Some(location) = body.pointer_mut("/data/params/wellLocation") {
+        for axis in ["x", "y", "z"] {
+            let off = location["offset"][axis].as_f64().unwrap_or(0.0);
+            location["offset"][axis] = off.into();
+        }
+    }
+}
+
 /// Serves one connection.
 fn serve(
     stream: TcpStream,
@@ -59,7 +70,8 @@ fn serve(
 ) {
     let mut out = stream.try_clone().expect("a stream");
     let mut reader = BufReader::new(stream);
-    while let Some((method, path, version, body)) = request(&mut reader) {
+    while let Some((method, path, version, mut body)) = request(&mut reader) {
+        placed(&mut body);
         let name = body["data"]["commandType"].as_str().unwrap_or_default().to_owned();
         let expected = recorded.get(*next);
         let same = |e: &Value| e["method"] == method.as_str() && e["path"] == path.as_str() && e["body"] == body;

@@ -108,7 +108,7 @@ fn a_protocol_is_run_scheduled_looked_into_and_formatted() {
     let data = client.data("run", json!({ "text": WARM.replace("water", "watr") }));
     assert_eq!((&data["report"], &data["findings"][0]["code"]), (&Value::Null, &json!("unknown-name")));
     let none = client.refused("run", json!({ "path": "w.mtx", "members": ["statu"] }));
-    assert!(none.contains("no member `statu`; it has schema"), "{none}");
+    assert!(none.contains("no member `statu`; use schema"), "{none}");
 
     let data = client.data("plan", json!({ "path": "w.mtx", "search": 1 }));
     assert_eq!(data["schedule"]["makespan"], 5.0, "{data}");
@@ -173,11 +173,7 @@ fn what_does_not_fit_is_said_in_words_and_the_session_goes_on() {
         ("run", json!({ "path": "w.mtx", "bytes": 1 }), "`bytes` must be from"),
         ("run", json!({ "path": "w.mtx", "unseen": "2mm" }), "`--unseen` needs"),
         ("run", json!({ "path": "w.mtx", "unseen": "2", "fidelity": "motion" }), "`unseen`: write a length"),
-        (
-            "run",
-            json!({ "path": "w.mtx", "really": "grip=0.5", "fidelity": "motion" }),
-            "it needs `--fidelity contact`",
-        ),
+        ("run", json!({ "path": "w.mtx", "really": "grip=0.5", "fidelity": "motion" }), "needs `--fidelity contact`"),
         ("contents", json!({ "path": "w.mtx", "column": 3 }), "`column` needs a `line`"),
         ("plan", json!({ "path": "w.mtx", "search": 10000 }), "`search` must be from"),
     ] {
