@@ -76,7 +76,7 @@ fn an_interaction_has_the_numbers_of_its_charges() {
         ("Na+ + K+ + H+ { psi: 0.1 }", "interaction-form", "with both signs of charge"),
         ("2 Na+ + Cl- { b0: 0.1 }", "interaction-form", "must be between dissolved species"),
         ("water + Cl- { lambda: 0.1 }", "interaction-form", "`water` is not dissolved"),
-        ("NaCl + Cl- { lambda: 0.1 }", "interaction-form", "`NaCl` stands here"),
+        ("NaCl + Cl- { lambda: 0.1 }", "interaction-form", "`NaCl` is not dissolved"),
         ("Na+ + Unobtainium { lambda: 0.1 }", "unknown-name", "Unobtainium"),
         ("Na+ + Cl- { b0: [1, 2, 3, 4, 5, 6, 7] }", "interaction-form", "1 to 6 terms, not 7"),
         ("Na+ + Cl- { b0: 0.1, reach: [1] }", "interaction-form", "two numbers"),

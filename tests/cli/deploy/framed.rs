@@ -253,7 +253,7 @@ fn what_cannot_be_framed_or_read_back_is_found() {
         ("reading temperature asks \"T\" expects \"{degC}{_}\"", "a text between two values"),
         ("reading temperature asks \"T\" expects \"{degC :05.1\"", "an opening or closing brace is missing"),
         ("reading active asks \"T\" expects \"{}\"", "the word for `active` once"),
-        ("reading active asks \"T\" expects \"{A = yes | B = no}\"", "never `yes`"),
+        ("reading active asks \"T\" expects \"{A = yes | B = no}\"", "`active` has no state `yes`"),
         ("reading active asks \"T\" expects \"{A = true | A = false}\"", "given for two words"),
         ("reading temperature hears \"T {degC}\" every 0 s", "the interval between messages"),
         ("reply \"x\\x7b\" fails refused", "a brace starts a value"),
