@@ -82,6 +82,10 @@ pub fn gaps(system: &System, args: &[f64], elements: &[Vec<f64>], trace: f64) ->
             Phase::Solid => 0.0,
             Phase::Formal => system.value(Part::Activity(i as u32), args),
             Phase::Solute => (amounts[i] / mass).ln() + LN_10 * own,
+            Phase::Extracted => {
+                let before = members[..i].iter().filter(|m| m.phase == Phase::Extracted).count();
+                (amounts[i] / args[layout.liquid(before)]).ln()
+            }
         }
     };
     let mut found = Gaps::default();

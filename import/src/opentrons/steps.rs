@@ -179,7 +179,7 @@ impl<'a> Steps<'a> {
         let wells = self.deck.wells_of(&place);
         let taken = self.taken.entry(rack).or_default();
         let next = labware.order.iter().find(|well| !taken.contains(*well));
-        let in_order = next.is_some_and(|next| wells.first() == Some(next)) && taken.len() % wells.len() == 0;
+        let in_order = next.is_some_and(|next| wells.first() == Some(next)) && taken.len().is_multiple_of(wells.len());
         taken.extend(wells);
         self.liquids.empty(command.text("pipetteId"));
         self.moved.remove(command.text("pipetteId"));
