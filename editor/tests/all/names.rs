@@ -145,7 +145,7 @@ fn hover_says_what_a_name_is() {
         ("bring |beaker", &["beaker = Beaker250mL", "Beaker250mL"]),
         ("target - |ambient", &["ambient: 22 degC", "22 degC = 295.15 K"]),
         ("std::|heating", &["use std::heating"]),
-        ("look.|elapsed", &["how long it has lasted"]),
+        ("look.|elapsed", &["its duration so far"]),
     ];
     for (what, parts) in cases {
         let text = said(what);

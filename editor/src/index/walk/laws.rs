@@ -101,6 +101,12 @@ impl Walk<'_> {
         for p in sig.all_params() {
             self.param(p);
         }
+        for of in sig.all_params().filter_map(|p| p.of.as_ref()) {
+            let meant = sig.all_params().find(|p| p.name.text == of.text);
+            if let Some(def) = meant.and_then(|p| self.index.declared_at(p.name.span)) {
+                self.known(of.span, def);
+            }
+        }
         for (label, params) in &sig.labelled {
             match params.first().and_then(|p| self.index.declared_at(p.name.span)) {
                 Some(def) => self.known(label.span, def),
