@@ -42,7 +42,7 @@ fn a_property_is_typed_where_it_is_written() {
             &["out-of-range: the heat capacity of `x` must be above zero"],
         ),
         ("phase: \"liquit\"", &["type-mismatch: `x.phase` expects one of `solid`, `liquid`, `gas`, found a text"]),
-        ("by: volume", &["type-mismatch: `by` is `mass`"]),
+        ("by: volume", &["type-mismatch: `by` must be `mass`"]),
         ("fade: 3 s", &["unknown-field: a species has no field `fade`"]),
         (
             "density: 1 g/mL, molar_volume: 60 mL/mol",

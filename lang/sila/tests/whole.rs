@@ -36,7 +36,7 @@ fn what_is_wrong_is_said_with_its_line() {
         ("<Identifier>Quiet</Identifier>", "<Identifier>Mode</Identifier>", "`Mode` is defined twice"),
         ("<Identifier>Stop</Identifier>", "<Identifier>stop it</Identifier>", "not an identifier"),
         ("<DataTypeIdentifier>PlateTemperature", "<DataTypeIdentifier>Plate", "`Plate` is not defined"),
-        ("<Factor>60</Factor>", "<Factor>0</Factor>", "not 0"),
+        ("<Factor>60</Factor>", "<Factor>0</Factor>", "must not be 0"),
         ("FeatureVersion=\"1.0\"", "FeatureVersion=\"one\"", "as in `1.0`"),
         ("<Set>", "<Sets>", "unknown constraint `Sets`"),
         ("</Feature>", METADATA, "the error `Unknown` is not defined"),
