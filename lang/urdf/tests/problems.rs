@@ -75,7 +75,11 @@ const MISTAKES: &[(&str, &str, &str)] = &[
         "effort=\"3\"/>\n    <safety",
         "`limit` of joint `turn` has no `velocity`",
     ),
-    ("velocity=\"2\" effort=\"3\"/>\n    <safety", "velocity=\"0\" effort=\"3\"/>\n    <safety", "is 0, but must be above 0"),
+    (
+        "velocity=\"2\" effort=\"3\"/>\n    <safety",
+        "velocity=\"0\" effort=\"3\"/>\n    <safety",
+        "is 0, but must be above 0",
+    ),
     ("<limit upper=\"1\" velocity=\"2\" effort=\"3\"/>", "", "line 15: joint `slide` has no `limit`"),
     ("<mimic joint=\"turn\"", "<mimic joint=\"trun\"", "line 18: joint `slide` follows `trun`, which is not a joint"),
     ("<mimic joint=\"turn\"", "<mimic joint=\"slide\"", "line 15: joint `slide` follows itself"),
