@@ -54,12 +54,14 @@ pub(super) struct Form {
     pub(super) needs: &'static [(&'static str, Holds)],
     /// What it may say.
     pub(super) takes: &'static [(&'static str, Holds)],
+    /// Where in a well, if it may say that.
+    spot: &'static [(&'static str, Holds)],
 }
 
 impl Form {
     /// What a field holds.
     pub(super) fn field(&self, name: &str) -> Option<Holds> {
-        self.needs.iter().chain(self.takes).find(|(n, _)| *n == name).map(|(_, holds)| *holds)
+        self.needs.iter().chain(self.takes).chain(self.spot).find(|(n, _)| *n == name).map(|(_, holds)| *holds)
     }
 }
 
@@ -73,7 +75,16 @@ const fn form(
     needs: &'static [(&'static str, Holds)],
     takes: &'static [(&'static str, Holds)],
 ) -> Form {
-    Form { name, about, needs, takes }
+    Form { name, about, needs, takes, spot: &[] }
+}
+
+/// A command to a pipette that may say where in the well.
+const fn at(
+    name: &'static str,
+    needs: &'static [(&'static str, Holds)],
+    takes: &'static [(&'static str, Holds)],
+) -> Form {
+    Form { name, about: About::Pipette, needs, takes, spot: SPOT }
 }
 
 use Holds::{Definition, Flag, Location, Number, Text, Well};
@@ -84,36 +95,15 @@ const FORMS: &[Form] = &[
     form("loadLabware", About::Labware, &[("definition", Definition), ("location", Location)], &[]),
     form("loadModule", About::Module, &[("model", Text), ("location", Location)], &[]),
     form("loadLiquid", About::Well, &[("volume", Number)], &[]),
-    form("pickUpTip", About::Pipette, &[("well", Well)], SPOT),
-    form("aspirate", About::Pipette, &[("well", Well), ("volume", Number), ("flowRate", Number)], SPOT),
-    form("dispense", About::Pipette, &[("well", Well), ("volume", Number), ("flowRate", Number)], SPOT),
-    form("blowout", About::Pipette, &[("well", Well), ("flowRate", Number)], SPOT),
-    form(
-        "touchTip",
-        About::Pipette,
-        &[("well", Well)],
-        &[
-            ("origin", Holds::Origin),
-            ("x", Holds::Offset),
-            ("y", Holds::Offset),
-            ("z", Holds::Offset),
-            ("radius", Number),
-            ("speed", Number),
-        ],
-    ),
-    form(
+    at("pickUpTip", &[("well", Well)], &[]),
+    at("aspirate", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[]),
+    at("dispense", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[]),
+    at("blowout", &[("well", Well), ("flowRate", Number)], &[]),
+    at("touchTip", &[("well", Well)], &[("radius", Number), ("speed", Number)]),
+    at(
         "moveToWell",
-        About::Pipette,
         &[("well", Well)],
-        &[
-            ("origin", Holds::Origin),
-            ("x", Holds::Offset),
-            ("y", Holds::Offset),
-            ("z", Holds::Offset),
-            ("forceDirect", Flag),
-            ("speed", Holds::Given),
-            ("minimumZHeight", Holds::Given),
-        ],
+        &[("forceDirect", Flag), ("speed", Holds::Given), ("minimumZHeight", Holds::Given)],
     ),
     form("aspirateInPlace", About::Pipette, &[("volume", Number), ("flowRate", Number)], &[]),
     form("dropTip", About::Pipette, &[("well", Well)], &[("alternateDropLocation", Flag)]),

@@ -96,6 +96,11 @@ impl Command {
         self.params[name].as_f64()
     }
 
+    /// Its volume, uL; 0 where it gives none.
+    pub(super) fn volume(&self) -> f64 {
+        self.number("volume").unwrap_or(0.0)
+    }
+
     /// What its result or, in a JSON protocol, its parameters call what it loads.
     pub(super) fn loaded(&self, name: &str) -> Option<&str> {
         self.result[name].as_str().or_else(|| self.params[name].as_str())

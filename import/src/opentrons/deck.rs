@@ -200,16 +200,19 @@ impl Deck {
         }
     }
 
+    /// The labware that has a name here.
+    fn named(&self, name: &str) -> Option<&Labware> {
+        self.labware.values().find(|labware| labware.name == name)
+    }
+
     /// What a well takes, uL.
     pub(super) fn capacity(&self, labware: &str, well: &str) -> f64 {
-        let labware = self.labware.values().find(|known| known.name == labware);
-        labware.and_then(|labware| labware.wells.get(well)).map_or(0.0, |well| well.capacity)
+        self.named(labware).and_then(|labware| labware.wells.get(well)).map_or(0.0, |well| well.capacity)
     }
 
     /// What the first well of a place holds up to a height, uL: as if it were as wide as its opening, and no more than it takes.
     pub(super) fn held_below(&self, place: &Place, height: f64) -> f64 {
-        let labware = self.labware.values().find(|labware| labware.name == place.of);
-        let well = self.wells_of(place).first().and_then(|name| labware?.wells.get(name));
+        let well = self.wells_of(place).first().and_then(|name| self.named(&place.of)?.wells.get(name));
         well.map_or(0.0, |well| (well.area * height.max(0.0)).min(well.capacity))
     }
 
@@ -219,8 +222,7 @@ impl Deck {
             At::Well(well) => vec![well.clone()],
             At::Wells(wells) => wells.clone(),
             At::Column(number) => {
-                let labware = self.labware.values().find(|labware| labware.name == place.of);
-                let order = labware.map_or(&[][..], |labware| &labware.order);
+                let order = self.named(&place.of).map_or(&[][..], |labware| &labware.order);
                 order.iter().filter(|w| cell(w).is_some_and(|(_, c)| c as usize == *number)).cloned().collect()
             }
         }

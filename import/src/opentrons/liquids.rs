@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 /// A well by labware and name.
 pub(super) type Name = (String, String);
 
+/// What wells hold at the start: volume in uL, and what of.
+pub(super) type Holding = BTreeMap<Name, (f64, String)>;
+
 /// A well, uL.
 #[derive(Clone, Copy, Debug, Default)]
 struct Well {

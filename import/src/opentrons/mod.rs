@@ -21,7 +21,7 @@ use crate::{Imported, LeftOut, Mistake};
 use analysis::{Analysis, Command};
 use deck::{Deck, Kind};
 use library::Library;
-use liquids::Liquids;
+use liquids::{Holding, Liquids};
 use node::{cell, folded};
 use steps::Steps;
 use words::number;
@@ -61,7 +61,7 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
         Mistake { line: 0, why: format!("the written file cannot be read: {why}") }
     })?;
-    Ok(Imported { text, left_out, files: deck.files.clone().into_iter().collect() })
+    Ok(Imported { text, left_out, files: deck.files.into_iter().collect() })
 }
 
 /// The flow rates that each pipette uses most, uL/s.
@@ -100,10 +100,10 @@ fn parked(analysis: &Analysis) -> BTreeSet<String> {
 fn steps<'a>(
     analysis: &'a Analysis,
     deck: &'a Deck,
-    flows: &BTreeMap<String, [f64; 3]>,
+    flows: &'a BTreeMap<String, [f64; 3]>,
     liquids: Liquids,
 ) -> Steps<'a> {
-    let mut steps = Steps::new(analysis, deck, flows.clone(), liquids);
+    let mut steps = Steps::new(analysis, deck, flows, liquids);
     let is_step = |c: &Command| !c.command_type.starts_with("load");
     // The robot begins at home by itself.
     let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);
@@ -112,9 +112,6 @@ fn steps<'a>(
     }
     steps
 }
-
-/// What a well holds at the start: volume in uL, and what of.
-type Holding = BTreeMap<(String, String), (f64, String)>;
 
 /// What the protocol says that wells hold; else, of sources, what they need, as far as it fits in.
 fn holding(steps: &Steps<'_>, commands: &[Command], deck: &Deck) -> Holding {
@@ -150,8 +147,7 @@ impl Page<'_> {
         for (liquid, words) in &liquids {
             let _ = writeln!(
                 out,
-                "\n/// {words}: assumed to be water, because the protocol does not give its contents.\nsolution {words_name} {{ water: 100 %w/w }}",
-                words_name = liquid
+                "\n/// {words}: assumed to be water, because the protocol does not give its contents.\nsolution {liquid} {{ water: 100 %w/w }}"
             );
         }
         out.push_str("\nlab deck {\nambient: 22 degC\n");
@@ -188,12 +184,10 @@ impl Page<'_> {
                     .filter(|((_, flow), own)| (flow - own).abs() > 1e-9 * own)
                     .map(|((name, flow), _)| format!("{name}: {} uL/s", number(flow)))
                     .collect();
-                let other = if other.is_empty() { String::new() } else { format!(" {{ {} }}", other.join(", ")) };
-                format!("{}: {}{other}", mounted.mount, mounted.pipette.asset)
+                format!("{}: {}{}", mounted.mount, mounted.pipette.asset, words::braced(&other))
             })
             .collect();
-        let mounts = if mounts.is_empty() { String::new() } else { format!(" {{ {} }}", mounts.join(", ")) };
-        let _ = writeln!(out, "ot2 = OT2{mounts} at (0, 0, 0) m");
+        let _ = writeln!(out, "ot2 = OT2{} at (0, 0, 0) m", words::braced(&mounts));
         for id in &self.deck.loaded {
             if let Some(module) = self.deck.modules.get(id) {
                 let _ = writeln!(out, "{} = {} on ot2.slot[{}]", module.name, module.asset, module.slot);
@@ -251,6 +245,6 @@ impl Page<'_> {
                 },
             )
             .collect();
-        if all.is_empty() { String::new() } else { format!(" holding {{ {} }}", all.join(", ")) }
+        if all.is_empty() { String::new() } else { format!(" holding{}", words::braced(&all)) }
     }
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::analysis::{Analysis, Command};
 use super::deck::{Deck, Kind, Mounted};
-use super::liquids::Liquids;
+use super::liquids::{Holding, Liquids};
 use super::node::{Node, Place};
 use super::words::{self, number};
 use crate::LeftOut;
@@ -37,7 +37,16 @@ pub(super) struct Steps<'a> {
     /// Modules that shake.
     shaking: BTreeSet<String>,
     /// The flow rates of each pipette that hold where a step says nothing, uL/s.
-    flows: BTreeMap<String, [f64; 3]>,
+    flows: &'a BTreeMap<String, [f64; 3]>,
+}
+
+/// Where a command works.
+struct Spot {
+    place: Place,
+    /// How far above the rim, mm.
+    above: f64,
+    /// Of the well, mm.
+    depth: f64,
 }
 
 /// What flows.
@@ -52,7 +61,7 @@ impl<'a> Steps<'a> {
     pub(super) fn new(
         analysis: &'a Analysis,
         deck: &'a Deck,
-        flows: BTreeMap<String, [f64; 3]>,
+        flows: &'a BTreeMap<String, [f64; 3]>,
         liquids: Liquids,
     ) -> Self {
         Steps {
@@ -131,8 +140,8 @@ impl<'a> Steps<'a> {
         Ok((mounted, format!("ot2.{}", mounted.mount)))
     }
 
-    /// What a command goes to, with how far above the rim, mm.
-    fn place(&self, command: &Command) -> Result<(Place, f64, f64), String> {
+    /// Where a command works.
+    fn spot(&self, command: &Command) -> Result<Spot, String> {
         let (mounted, _) = self.pipette(command)?;
         let labware = self.deck.labware.get(command.text("labwareId")).ok_or("its labware is not imported")?;
         let well = command.text("wellName");
@@ -146,7 +155,7 @@ impl<'a> Steps<'a> {
             None | Some("top" | "default") => z,
             Some(other) => return Err(format!("a height from the {other} is not supported")),
         };
-        Ok((place, above, depth))
+        Ok(Spot { place, above, depth })
     }
 
     /// Options of a step, in braces.
@@ -165,12 +174,20 @@ impl<'a> Steps<'a> {
                 all.push(format!("{axis}: {} mm", number(off)));
             }
         }
-        if all.is_empty() { String::new() } else { format!(" {{ {} }}", all.join(", ")) }
+        words::braced(&all)
+    }
+
+    /// A step in a well: what stands before the place, by whom, the height where a step says none, mm from the rim, and options.
+    fn work(&mut self, command: &Command, before: &str, by: &str, spot: Spot, usual: f64, options: &str) {
+        let behind = format!("{by}{}{options}", height(spot.above, spot.depth, Some(usual)));
+        self.nodes.push(Node::about(before, spot.place, &behind));
+        let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned(), spot.above);
+        self.moved.insert(command.text("pipetteId").to_owned(), here);
     }
 
     fn pick_up(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        let (place, ..) = self.place(command)?;
+        let Spot { place, .. } = self.spot(command)?;
         let rack = command.text("labwareId").to_owned();
         let labware = self.deck.labware.get(&rack).ok_or("its rack is not imported")?;
         if labware.kind != Kind::Tips {
@@ -200,7 +217,7 @@ impl<'a> Steps<'a> {
 
     fn give_back(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        let (place, ..) = self.place(command)?;
+        let Spot { place, .. } = self.spot(command)?;
         self.liquids.empty(command.text("pipetteId"));
         self.nodes.push(Node::about("return tip to ", place, &format!(" by {by}")));
         Ok(())
@@ -208,73 +225,69 @@ impl<'a> Steps<'a> {
 
     fn aspirate(&mut self, command: &Command) -> Result<(), String> {
         let (mounted, by) = self.pipette(command)?;
-        let volume = command.number("volume").unwrap_or(0.0);
-        let id = command.text("pipetteId").to_owned();
-        let (place, above, depth) = self.place(command)?;
+        let id = command.text("pipetteId");
+        let spot = self.spot(command)?;
         // What is aspirated above the rim is air.
-        if above > DUST {
-            let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned());
-            let is_there = self.moved.get(&id).is_some_and(|(labware, well, height)| {
-                (labware, well) == (&here.0, &here.1) && (height - above).abs() < DUST
+        if spot.above > DUST {
+            let is_there = self.moved.get(id).is_some_and(|(labware, well, height)| {
+                labware == command.text("labwareId")
+                    && well == command.text("wellName")
+                    && (height - spot.above).abs() < DUST
             });
             if !is_there {
-                let at = height(above, depth, None);
-                self.nodes.push(Node::about(&format!("move {by} to "), place, &at));
-                self.moved.insert(id.clone(), (here.0, here.1, above));
+                self.work(command, &format!("move {by} to "), "", spot, 0.0, "");
             }
-            self.liquids.air(&id, volume);
-            let options = self.options(command, Some(Flow::In), &[]);
-            return self.say(format!("air gap {} uL by {by}{}", number(volume), options));
+            return self.air_gap(command, &by);
         }
-        let below = self.deck.held_below(&place, above + depth);
-        let how = (mounted.pipette.channels, below);
-        let lacks = self.liquids.aspirate(&id, volume, how, &place.of, &self.deck.wells_of(&place));
+        let below = self.deck.held_below(&spot.place, spot.above + spot.depth);
+        let (how, wells) = ((mounted.pipette.channels, below), self.deck.wells_of(&spot.place));
+        let lacks = self.liquids.aspirate(id, command.volume(), how, &spot.place.of, &wells);
         let more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
         let options = self.options(command, Some(Flow::In), &more);
-        let behind = format!(" by {by}{}{options}", height(above, depth, Some(DIP - depth)));
-        self.nodes.push(Node::about(&format!("aspirate {} uL from ", number(volume)), place, &behind));
-        self.note_place(command, above);
+        let before = format!("aspirate {} uL from ", number(command.volume()));
+        let usual = DIP - spot.depth;
+        self.work(command, &before, &format!(" by {by}"), spot, usual, &options);
         Ok(())
     }
 
     fn dispense(&mut self, command: &Command) -> Result<(), String> {
-        let (mounted, by) = self.pipette(command)?;
-        let volume = command.number("volume").unwrap_or(0.0);
-        let id = command.text("pipetteId").to_owned();
-        if command.text("labwareId") == TRASH {
-            self.liquids.dispense(&id, volume, mounted.pipette.channels, "", &[]);
-            let options = self.options(command, Some(Flow::Out), &[]);
-            return self.say(format!("dispense {} uL into ot2.trash[A1] by {by}{options}", number(volume)));
-        }
-        let (place, above, depth) = self.place(command)?;
-        self.liquids.dispense(&id, volume, mounted.pipette.channels, &place.of, &self.deck.wells_of(&place));
-        let behind =
-            format!(" by {by}{}{}", height(above, depth, Some(0.0)), self.options(command, Some(Flow::Out), &[]));
-        self.nodes.push(Node::about(&format!("dispense {} uL into ", number(volume)), place, &behind));
-        self.note_place(command, above);
-        Ok(())
+        let (volume, channels) = (command.volume(), self.pipette(command)?.0.pipette.channels);
+        let before = format!("dispense {} uL into ", number(volume));
+        self.give(command, &before, Flow::Out, |liquids, labware, wells| {
+            liquids.dispense(command.text("pipetteId"), volume, channels, labware, wells);
+        })
     }
 
     fn blow_out(&mut self, command: &Command) -> Result<(), String> {
-        let (mounted, by) = self.pipette(command)?;
-        let id = command.text("pipetteId").to_owned();
+        let channels = self.pipette(command)?.0.pipette.channels;
+        self.give(command, "blow out into ", Flow::Blow, |liquids, labware, wells| {
+            liquids.blow_out(command.text("pipetteId"), channels, labware, wells);
+        })
+    }
+
+    /// Liquid goes into wells or the bin.
+    fn give(
+        &mut self,
+        command: &Command,
+        before: &str,
+        flow: Flow,
+        pass: impl FnOnce(&mut Liquids, &str, &[String]),
+    ) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let options = self.options(command, Some(flow), &[]);
         if command.text("labwareId") == TRASH {
-            self.liquids.blow_out(&id, mounted.pipette.channels, "", &[]);
-            let options = self.options(command, Some(Flow::Blow), &[]);
-            return self.say(format!("blow out into ot2.trash[A1] by {by}{options}"));
+            pass(&mut self.liquids, "", &[]);
+            return self.say(format!("{before}ot2.trash[A1] by {by}{options}"));
         }
-        let (place, above, depth) = self.place(command)?;
-        self.liquids.blow_out(&id, mounted.pipette.channels, &place.of, &self.deck.wells_of(&place));
-        let behind =
-            format!(" by {by}{}{}", height(above, depth, Some(0.0)), self.options(command, Some(Flow::Blow), &[]));
-        self.nodes.push(Node::about("blow out into ", place, &behind));
-        self.note_place(command, above);
+        let spot = self.spot(command)?;
+        pass(&mut self.liquids, &spot.place.of, &self.deck.wells_of(&spot.place));
+        self.work(command, before, &format!(" by {by}"), spot, 0.0, &options);
         Ok(())
     }
 
     fn touch(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        let (place, above, depth) = self.place(command)?;
+        let spot = self.spot(command)?;
         let mut more = Vec::new();
         let radius = command.number("radius").unwrap_or(1.0);
         if (radius - 1.0).abs() > 1e-9 {
@@ -284,15 +297,14 @@ impl<'a> Steps<'a> {
         if (speed - 60.0).abs() > 1e-9 {
             more.push(format!("speed: {} mm/s", number(speed)));
         }
-        let behind = format!(" by {by}{}{}", height(above, depth, Some(TOUCH)), self.options(command, None, &more));
-        self.nodes.push(Node::about("touch tip to ", place, &behind));
-        self.note_place(command, above);
+        let options = self.options(command, None, &more);
+        self.work(command, "touch tip to ", &format!(" by {by}"), spot, TOUCH, &options);
         Ok(())
     }
 
     fn move_to(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        let (place, above, depth) = self.place(command)?;
+        let spot = self.spot(command)?;
         let mut more = Vec::new();
         if let Some(speed) = command.number("speed") {
             more.push(format!("speed: {} mm/s", number(speed)));
@@ -303,27 +315,23 @@ impl<'a> Steps<'a> {
         if let Some(clear) = command.number("minimumZHeight") {
             more.push(format!("clear: {} mm", number(clear)));
         }
-        let behind = format!("{}{}", height(above, depth, Some(0.0)), self.options(command, None, &more));
-        self.nodes.push(Node::about(&format!("move {by} to "), place, &behind));
-        self.note_place(command, above);
+        let options = self.options(command, None, &more);
+        self.work(command, &format!("move {by} to "), "", spot, 0.0, &options);
         Ok(())
-    }
-
-    fn note_place(&mut self, command: &Command, above: f64) {
-        let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned(), above);
-        self.moved.insert(command.text("pipetteId").to_owned(), here);
     }
 
     fn air(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        let volume = command.number("volume").unwrap_or(0.0);
-        let id = command.text("pipetteId").to_owned();
-        if self.moved.get(&id).is_some_and(|(_, _, above)| *above < 0.0) {
+        if self.moved.get(command.text("pipetteId")).is_some_and(|(_, _, above)| *above < 0.0) {
             return Err("it aspirates at the position of the tip, in a well".to_owned());
         }
-        self.liquids.air(&id, volume);
+        self.air_gap(command, &by)
+    }
+
+    fn air_gap(&mut self, command: &Command, by: &str) -> Result<(), String> {
+        self.liquids.air(command.text("pipetteId"), command.volume());
         let options = self.options(command, Some(Flow::In), &[]);
-        self.say(format!("air gap {} uL by {by}{options}", number(volume)))
+        self.say(format!("air gap {} uL by {by}{options}", number(command.volume())))
     }
 
     fn home(&mut self, command: &Command) -> Result<(), String> {
@@ -361,20 +369,19 @@ impl<'a> Steps<'a> {
         let name = known(command.text("moduleId")).ok_or("its module is not imported")?;
         let celsius = command.number("celsius").map(number).unwrap_or_default();
         match verb {
-            "setTargetTemperature" => self.say(format!("heat {name} to {celsius} degC")),
-            "waitForTemperature" if celsius.is_empty() => self.say(format!("settle {name}")),
-            "deactivate" | "deactivateHeater" => self.say(format!("stop heating {name}")),
+            "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
+                Err("it holds a temperature for a time".to_owned())
+            }
+            "setTargetTemperature" | "setTargetBlockTemperature" => self.say(format!("heat {name} to {celsius} degC")),
+            "waitForTemperature" | "waitForBlockTemperature" if celsius.is_empty() => {
+                self.say(format!("settle {name}"))
+            }
+            "deactivate" | "deactivateHeater" | "deactivateBlock" => self.say(format!("stop heating {name}")),
             "engage" => {
                 let height = command.number("height").ok_or("it gives no height")?;
                 self.say(format!("engage {name} at {} mm", number(height)))
             }
             "disengage" => self.say(format!("disengage {name}")),
-            "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
-                Err("it holds a temperature for a time".to_owned())
-            }
-            "setTargetBlockTemperature" => self.say(format!("heat {name} to {celsius} degC")),
-            "waitForBlockTemperature" => self.say(format!("settle {name}")),
-            "deactivateBlock" => self.say(format!("stop heating {name}")),
             "setTargetLidTemperature" => self.say(format!("heat lid {name} to {celsius} degC")),
             "waitForLidTemperature" => self.say(format!("settle lid {name}")),
             "deactivateLid" => self.say(format!("stop heating lid {name}")),
@@ -394,7 +401,7 @@ impl<'a> Steps<'a> {
     }
 
     /// What liquids wells hold at the start, by labware and well: volume in uL and name.
-    pub(super) fn loaded(&self, commands: &[Command]) -> BTreeMap<(String, String), (f64, String)> {
+    pub(super) fn loaded(&self, commands: &[Command]) -> Holding {
         let mut out = BTreeMap::new();
         for command in commands.iter().filter(|c| c.command_type == "loadLiquid") {
             let Some(labware) = self.deck.labware.get(command.text("labwareId")) else { continue };

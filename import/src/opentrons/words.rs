@@ -51,6 +51,11 @@ pub(super) fn number(value: f64) -> String {
     if plain.abs() < 1e-9 { "0".to_owned() } else { plain.to_string() }
 }
 
+/// ` { a, b }`; nothing of none.
+pub(super) fn braced(all: &[String]) -> String {
+    if all.is_empty() { String::new() } else { format!(" {{ {} }}", all.join(", ")) }
+}
+
 /// A text as a literal; what stands in braces there is no value.
 pub(super) fn text(words: &str) -> String {
     let line = words.split_whitespace().collect::<Vec<_>>().join(" ");

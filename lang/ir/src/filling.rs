@@ -30,14 +30,16 @@ pub fn inside(shape: &Shape) -> Option<Vec<[f64; 2]>> {
 
 /// From the lowest point of the inside up to the rim, m.
 pub fn depth(inside: &[[f64; 2]]) -> f64 {
-    let bottom = inside.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-    inside.last().map_or(0.0, |rim| rim[1] - bottom)
+    inside.last().map_or(0.0, |rim| rim[1] - lowest(inside))
+}
+
+fn lowest(inside: &[[f64; 2]]) -> f64 {
+    inside.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min)
 }
 
 /// What a vessel holds up to a height above the lowest point of its inside, m3.
 pub fn below(inside: &[[f64; 2]], height: f64) -> f64 {
-    let bottom = inside.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-    let top = bottom + height.min(depth(inside));
+    let top = lowest(inside) + height.min(depth(inside));
     inside.windows(2).map(|pair| frustum(pair[0], pair[1], top)).sum::<f64>().max(0.0)
 }
 
@@ -56,7 +58,7 @@ fn frustum([r0, z0]: [f64; 2], [r1, z1]: [f64; 2], top: f64) -> f64 {
 
 /// Points (volume, level), m3 and m, both rising from nothing to the rim.
 pub fn levels(inside: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let bottom = inside.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+    let bottom = lowest(inside);
     let (whole, off) = (depth(inside), OFF * depth(inside));
     let mut heights: Vec<f64> = inside.iter().map(|p| p[1] - bottom).chain([0.0, whole]).collect();
     heights.sort_by(f64::total_cmp);

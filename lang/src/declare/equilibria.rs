@@ -171,7 +171,7 @@ fn check_form(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let is_proton = |s: &SpeciesId| species.get(*s).formula.as_ref().is_some_and(|f| f.to_string() == "H+");
-    let dry = |side: &[(SpeciesId, f64)]| side.iter().filter(|(s, _)| !species.get(*s).is_water).count();
+    let dry = |side: &[(SpeciesId, f64)]| dry_terms(species, side).len();
     if let Some(f) = field(fields, "pka") {
         let gives = right.iter().any(|(s, n)| is_proton(s) && *n == 1.0) && dry(left) == 1;
         if !gives {

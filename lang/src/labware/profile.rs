@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use matterix_ir::filling;
 use matterix_ir::math::{acos, cos, sin};
 
 /// Points along a section with a curved wall: its volume is off by less than 0.1 %.
@@ -99,8 +100,7 @@ impl Profile {
 
     /// The volume in it, µL.
     pub(super) fn volume(&self) -> f64 {
-        let cone = |[[r0, z0], [r1, z1]]: [[f64; 2]; 2]| (z1 - z0) * (r0 * r0 + r0 * r1 + r1 * r1);
-        PI / 3.0 * self.0.windows(2).map(|two| cone([two[0], two[1]])).sum::<f64>()
+        filling::below(&self.0, filling::depth(&self.0))
     }
 }
 
