@@ -350,3 +350,103 @@ fn no_heat_capacity_is_negative() {
         passes(salt, &text);
     }
 }
+
+const DYES: &str = "mtx 1
+use std::glassware::Beaker250mL
+use std::devices::Container
+capability Species { param fades: Frequency = 0 1/s }
+species Leuco { formula: \"C10H10\", molar_volume: 110 mL/mol, heat_capacity: 220 J/(mol*K) }
+species Dye { formula: \"C10H10\", molar_volume: 110 mL/mol, heat_capacity: 220 J/(mol*K), fades: 0.01 1/s }
+";
+
+const CUPS: &str = "lab bench {
+    ambient: 25 degC
+    cup = Beaker250mL at (0, 0, 0) m holding 150 g of water + 5 mmol of Dye
+    pot = Beaker250mL at (1, 0, 0) m holding 100 g of water + 5 mmol of Dye
+    blank = Beaker250mL at (2, 0, 0) m holding 100 g of water
+}
+";
+
+/// A law over a vessel and a species holds for what the vessel's mixture can hold, whatever the order of its parameters is and whatever
+/// else it is about; and a species that states nothing has what the declaration of the property says.
+#[test]
+fn laws_over_vessels_and_species_act() {
+    let halved = "workflow go in bench { wait 69.3147 s; expect cup.contents.amount[Dye] in 2.4999 mmol .. 2.5001 mmol; expect blank.contents.mass in 99.9 g .. 100.1 g }\n";
+    let fades = |params: &str| {
+        format!(
+            "{DYES}process fades({params}) while s.fades > 0 1/s {{\n    let q = s.fades * v.contents.amount[s]\n    v.contents.amount[s]' -= q\n    v.contents.amount[Leuco]' += q\n}}\n{CUPS}{halved}"
+        )
+    };
+    passes("vessel", &fades("v: Container, s: Species"));
+    passes("turned", &fades("s: Species, v: Container"));
+    let mixture = fades("v: Mixture, s: Species").replace("v.contents", "v");
+    passes("mixture", &mixture);
+    let room = fades("v: Container, r: Room, s: Species")
+        .replace("process", "capability Room { param warm: Bool = true }\nasset R: Room {}\nprocess")
+        .replace("lab bench {", "lab bench {\n    room = R");
+    passes("room", &room);
+}
+
+#[test]
+fn cautions_over_vessels_and_species_and_over_transfers_with_more_are_found() {
+    let codes = |name: &str, caution: &str, rest: &str| -> Vec<String> {
+        let flow = "process drips(a: Beaker250mL, b: Beaker250mL) while a.contents.mass > b.contents.mass and elapsed < 1 s { move(1 mL/s, from: a.contents, to: b.contents) }";
+        let text = format!(
+            "{DYES}capability Hood {{ param open: Bool = true }}\nasset H: Hood {{}}\n{caution}\n{flow}\n{CUPS}workflow go in bench {{ wait 2 s }}\n"
+        )
+        .replace("lab bench {", &format!("lab bench {{\n{rest}"));
+        found(name, &text).into_iter().map(|f| f.1).filter(|code| code == "hazard").collect()
+    };
+    let of_vessels =
+        "caution much(v: Container, s: Species) when s.fades > 0 1/s and v.contents.amount[s] > 1 mmol \"take less\"";
+    assert_eq!(codes("much", of_vessels, "").len(), 2, "one for each vessel that holds the dye");
+    let of_species = "caution twice(a: Mixture, b: Mixture, s: Species) of move(share, from: a, to: b) when s.fades > 0 1/s and b.amount[s] > 1 mmol \"no more\"";
+    assert!(!codes("twice", of_species, "").is_empty());
+    let of_hood = "caution hooded(a: Mixture, b: Mixture, h: Hood) of move(share, from: a, to: b) when h.open and a.amount[Dye] > 1 mmol \"close it\"";
+    assert_eq!(codes("without", of_hood, "").len(), 0);
+    assert!(!codes("hooded", of_hood, "    hood = H").is_empty());
+    let shut = codes("shut", of_hood, "    hood = H { open: false }");
+    assert_eq!(shut.len(), 0);
+    // A salt of the lab has split by the time a hazard asks for its ions.
+    let salt = "caution salty(v: Container) when v.contents.amount[Na+] > 3 mmol \"less\"";
+    assert_eq!(
+        codes("salty", salt, "    brine = Beaker250mL at (3, 0, 0) m holding 100 g of water + 5 mmol of NaCl").len(),
+        1
+    );
+    assert_eq!(
+        codes("mild", salt, "    brine = Beaker250mL at (3, 0, 0) m holding 100 g of water + 2 mmol of NaCl").len(),
+        0
+    );
+    let double =
+        "caution salty(v: Container) when v.contents.amount[Na+] > 3 mmol and v.contents.amount[NaCl] > 0 mol \"less\"";
+    assert_eq!(
+        codes("double", double, "    brine = Beaker250mL at (3, 0, 0) m holding 100 g of water + 5 mmol of NaCl").len(),
+        0
+    );
+    let text = format!(
+        "{DYES}caution odd(a: Container, b: Mixture) of move(share, from: a, to: b) when b.amount[Dye] > 1 mmol \"no\"\n{CUPS}"
+    );
+    assert!(found("ends", &text).iter().any(|f| f.1 == "type-mismatch"));
+}
+
+/// A symmetric relation of two things gives one law per pair, beside further parameters as well; unless these belong to one of the two.
+#[test]
+fn laws_over_pairs_and_more_exist_once_per_pair() {
+    let text = |params: &str, condition: &str, given: &str, level: &str| {
+        format!(
+            "mtx 1\ncapability Tank {{ state level: Ratio }}\ncapability Room {{ param leak: Ratio = 1 }}\nasset T: Tank {{}}\nasset R: Room {{}}\n\
+             relation near(a: Tank, b: Tank) symmetric\nrelation serves(r: Room, t: Tank)\n\
+             process flows({params}) while {condition} {{\n    a.level' -= 0.001 1/s * r.leak\n    b.level' += 0.001 1/s * r.leak\n}}\n\
+             lab bench {{\n    ambient: 25 degC\n    top = T {{ level: 1 }}\n    bottom = T {{ level: 0 }}\n    room = R\n    between top and bottom {{ near: true }}\n{given}}}\n\
+             workflow go in bench {{ wait 100 s; expect bottom.level in {level} }}\n"
+        )
+    };
+    let (once, turned) = ("0.0999 .. 0.1001", "-0.1001 .. -0.0999");
+    let served = |t: &str| format!("    between room and {t} {{ serves: true }}\n");
+    passes("with_room", &text("a: Tank, b: Tank, r: Room", "near(a, b)", "", once));
+    passes("room_first", &text("r: Room, b: Tank, a: Tank", "r.leak > 0 and near(a, b)", "", turned));
+    passes("tied", &text("a: Tank, b: Tank, r: Room", "near(a, b) and serves(r, a)", &served("top"), once));
+    passes("tied_second", &text("a: Tank, b: Tank, r: Room", "near(a, b) and serves(r, a)", &served("bottom"), turned));
+    let both = served("top") + &served("bottom");
+    passes("both", &text("a: Tank, b: Tank, r: Room", "near(a, b) and serves(r, a) and serves(r, b)", &both, once));
+}

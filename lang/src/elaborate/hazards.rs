@@ -15,7 +15,7 @@ use crate::eval::lab::Elaborator;
 use crate::eval::lab::Mode;
 use crate::eval::lab::observed::{Noting, Observed};
 use crate::eval::{Num, Scope, Value};
-use crate::names::DeclId;
+use crate::names::{DeclId, bare};
 use crate::near;
 use crate::units::Dimension;
 
@@ -126,14 +126,6 @@ fn several(of: &Expr) -> Vec<&Expr> {
     match &*of.kind {
         ExprKind::List(items) => items.iter().collect(),
         _ => vec![of],
-    }
-}
-
-/// The name that an expression consists of.
-fn bare(e: &Expr) -> Option<&str> {
-    match &*e.kind {
-        ExprKind::Name(n) => Some(&n.text),
-        _ => None,
     }
 }
 
@@ -253,22 +245,22 @@ impl<'a> Elaborator<'a> {
     fn of_transfers(&mut self, declared: Declared<'a>, share: &Expr, ends: (&Expr, &Expr), out: &mut Vec<Hazard>) {
         let (Some(share), Some(from), Some(to)) = (bare(share), bare(ends.0), bare(ends.1)) else { return };
         for (a, b) in self.moves.clone() {
-            let mut scope = Scope::module(declared.module);
-            let value = self.share_moved();
-            scope.bind(share.to_string(), value);
-            scope.bind(from.to_string(), Value::Instance(a));
-            scope.bind(to.to_string(), Value::Instance(b));
-            let Some(hazard) = self.hazard(declared, false, "", &mut scope) else { continue };
-            let then = match declared.of.filter(|_| declared.after.is_some()) {
-                None => None,
-                Some(of) => match self.expr(of, &mut scope) {
-                    Value::Num(Num { node, .. }) | Value::Bool(node) => Some(node),
-                    _ => continue,
-                },
-            };
-            let shown = |id: InstanceId| self.show(&Value::Instance(id));
-            let shown = format!("{}({}, {})", declared.name.text, shown(a), shown(b));
-            out.push(Hazard { shown, watched: Watched::Transfer(a, b, then), ..hazard });
+            let ends = [(from, a), (to, b)];
+            let Declared { params, module, name, when, .. } = declared;
+            let mut tuples = self.tuples_with(params, (module, name), when, &ends);
+            while let Some((mut scope, shown)) = tuples.next(self) {
+                let value = self.share_moved();
+                scope.bind(share.to_string(), value);
+                let Some(hazard) = self.hazard(declared, false, &shown, &mut scope) else { continue };
+                let then = match declared.of.filter(|_| declared.after.is_some()) {
+                    None => None,
+                    Some(of) => match self.expr(of, &mut scope) {
+                        Value::Num(Num { node, .. }) | Value::Bool(node) => Some(node),
+                        _ => continue,
+                    },
+                };
+                out.push(Hazard { watched: Watched::Transfer(a, b, then), about: Some(a), ..hazard });
+            }
         }
     }
 
@@ -321,6 +313,22 @@ impl<'a> Elaborator<'a> {
         let parameter = |e: &Expr| bare(e).is_some_and(|name| params.iter().any(|p| p.name.text == name));
         let moved = after.as_ref().or(of.as_ref()).and_then(transfer);
         let named = moved.and_then(|(share, a, b)| bare(share).filter(|_| parameter(a) && parameter(b)));
+        if let Some((_, from, to)) = moved.filter(|_| named.is_some()) {
+            for end in [from, to] {
+                let Some(Value::Instance(id)) = bare(end).and_then(|name| scope.var(name)).cloned() else { continue };
+                if !self.is_mixture(id) {
+                    self.report(
+                        Diagnostic::error(
+                            codes::TYPE_MISMATCH,
+                            end.span,
+                            "matter goes from one mixture into another",
+                            "not a mixture",
+                        )
+                        .help("declare both ends as `Mixture`: what a vessel `v` holds is `v.contents`"),
+                    );
+                }
+            }
+        }
         match (named, moved, after) {
             (Some(name), ..) => {
                 let share = self.placeholder(&Type::ratio(), name);

@@ -6,6 +6,7 @@ use matterix_ir::model::Action;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
+use super::pairs;
 use super::tuples::Tuples;
 use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
 use crate::declare::tables::MemberRef;
@@ -121,7 +122,7 @@ impl<'a> Elaborator<'a> {
         jobs
     }
 
-    /// Every tuple of instances, species and reactions that fits the parameters, as scopes; once per unordered pair
+    /// Every tuple of different instances, species and reactions that fits the parameters, as scopes; once per unordered pair
     /// where the condition asks for a symmetric relation of the two.
     pub(super) fn tuples(
         &mut self,
@@ -130,27 +131,57 @@ impl<'a> Elaborator<'a> {
         guard: Option<&'a Expr>,
         name: &'a Name,
     ) -> Tuples<'a> {
-        let mut sets: Vec<Vec<Value>> = Vec::new();
-        for p in params {
-            let ty = match &p.ty {
-                Some(ty) => self.resolve_type(ty, module),
-                None => Type::Any,
-            };
-            sets.push(match ty {
-                Type::Instance { kinds, .. } => (0..self.instances.len() as u32)
-                    .map(InstanceId)
-                    .filter(|i| kinds.iter().all(|k| self.instance_is(*i, *k)))
-                    .map(Value::Instance)
-                    .collect(),
-                Type::Reaction => {
-                    (0..self.tables.reactions.len() as u32).map(|r| Value::Reaction(ReactionId(r))).collect()
-                }
-                Type::Species => self.reach.anywhere().into_iter().map(Value::Species).collect(),
-                _ => Vec::new(),
-            });
-        }
-        let unordered = params.len() == 2 && guard.is_some_and(|g| self.asks_symmetric(g, params, module));
+        let sets: Vec<Vec<Value>> = params.iter().map(|p| self.fitting(p, module)).collect();
+        let is_instance = |set: &Vec<Value>| matches!(set.first(), Some(Value::Instance(_)));
+        let instances: Vec<&str> =
+            params.iter().zip(&sets).filter(|(_, set)| is_instance(set)).map(|(p, _)| p.name.text.as_str()).collect();
+        let names = self.tables.names;
+        let relation = |id| matches!(names.decl(id).item.kind, ItemKind::Relation { symmetric: true, .. });
+        let symmetric = |name: &str| names.lookup(module, name).is_some_and(relation);
+        let pair = guard.and_then(|g| pairs::unordered(g, &instances, &symmetric));
+        let position = |name: &str| params.iter().position(|p| p.name.text == name);
+        let unordered = pair.and_then(|(a, b)| Some((position(a)?, position(b)?))).map(|(a, b)| (a.min(b), a.max(b)));
         Tuples::new(params, (module, name), guard, sets, unordered)
+    }
+
+    /// The tuples in which some parameters stand for instances that are known, in an order that is known as well.
+    pub(super) fn tuples_with(
+        &mut self,
+        params: &'a [Param],
+        (module, name): (usize, &'a Name),
+        guard: &'a Expr,
+        known: &[(&str, InstanceId)],
+    ) -> Tuples<'a> {
+        let set = |p: &'a Param| match known.iter().find(|(name, _)| *name == p.name.text) {
+            Some((_, id)) if self.is_fitting(p, module, *id) => vec![Value::Instance(*id)],
+            Some(_) => Vec::new(),
+            None => self.fitting(p, module),
+        };
+        let sets = params.iter().map(set).collect();
+        Tuples::new(params, (module, name), Some(guard), sets, None)
+    }
+
+    fn is_fitting(&mut self, p: &'a Param, module: usize, id: InstanceId) -> bool {
+        let Some(Type::Instance { kinds, .. }) = p.ty.as_ref().map(|ty| self.resolve_type(ty, module)) else {
+            return false;
+        };
+        kinds.iter().all(|k| self.instance_is(id, *k))
+    }
+
+    /// What a parameter may stand for.
+    fn fitting(&mut self, p: &'a Param, module: usize) -> Vec<Value> {
+        match p.ty.as_ref().map(|ty| self.resolve_type(ty, module)) {
+            Some(Type::Instance { kinds, .. }) => (0..self.instances.len() as u32)
+                .map(InstanceId)
+                .filter(|i| kinds.iter().all(|k| self.instance_is(*i, *k)))
+                .map(Value::Instance)
+                .collect(),
+            Some(Type::Reaction) => {
+                (0..self.tables.reactions.len() as u32).map(|r| Value::Reaction(ReactionId(r))).collect()
+            }
+            Some(Type::Species) => self.reach.anywhere().into_iter().map(Value::Species).collect(),
+            _ => Vec::new(),
+        }
     }
 
     /// Which of two things a law takes first that exists once for both: the one that the lab names first in what it gives
@@ -170,26 +201,6 @@ impl<'a> Elaborator<'a> {
             Value::Species(s) => self.tables.species.get(*s).name.clone(),
             Value::Reaction(r) => self.tables.reactions[r.0 as usize].name.clone(),
             _ => String::new(),
-        }
-    }
-
-    fn asks_symmetric(&self, e: &Expr, params: &[Param], module: usize) -> bool {
-        match &*e.kind {
-            ExprKind::Binary(_, a, b) => {
-                self.asks_symmetric(a, params, module) || self.asks_symmetric(b, params, module)
-            }
-            ExprKind::Call(callee, args) => {
-                let ExprKind::Name(n) = &*callee.kind else { return false };
-                let Some(id) = self.tables.names.lookup(module, &n.text) else { return false };
-                let symmetric =
-                    matches!(self.tables.names.decl(id).item.kind, ItemKind::Relation { symmetric: true, .. });
-                symmetric
-                    && args.len() == 2
-                    && args.iter().all(
-                        |a| matches!(&*a.value.kind, ExprKind::Name(n) if params.iter().any(|p| p.name.text == n.text)),
-                    )
-            }
-            _ => false,
         }
     }
 

@@ -16,6 +16,7 @@ mod labels;
 pub mod laws;
 mod mended;
 pub mod mixtures;
+mod pairs;
 pub mod prune;
 pub mod solutions;
 mod tuples;

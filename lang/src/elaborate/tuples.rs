@@ -20,10 +20,10 @@ pub(super) struct Tuples<'a> {
     sets: Vec<Vec<Value>>,
     /// For each parameter up to one, what it may stand for after those before it, and how many of that were taken.
     open: Vec<(Vec<Value>, usize)>,
-    /// Each pair comes once, in the order of its instances.
-    unordered: bool,
-    /// Of a pair: its first, and the species that can get into it.
-    held: Option<(InstanceId, BTreeSet<SpeciesId>)>,
+    /// Two parameters of which each pair of instances comes once.
+    unordered: Option<(usize, usize)>,
+    /// The mixtures of the last combination, and the species that can get into one of them.
+    held: Option<(Vec<InstanceId>, BTreeSet<SpeciesId>)>,
     /// Whether a law without parameters is still to come.
     first: bool,
 }
@@ -34,7 +34,7 @@ impl<'a> Tuples<'a> {
         (module, name): (usize, &'a Name),
         guard: Option<&'a Expr>,
         sets: Vec<Vec<Value>>,
-        unordered: bool,
+        unordered: Option<(usize, usize)>,
     ) -> Self {
         Tuples { params, module, name, guard, sets, open: Vec::new(), unordered, held: None, first: true }
     }
@@ -106,20 +106,35 @@ impl<'a> Tuples<'a> {
         }
     }
 
-    /// Whether the second of a pair goes with its first: another instance, or what can be in it. There are many more species and reactions
-    /// than any one mixture meets.
+    /// Whether what a law is about goes together: different instances, each pair of a symmetric relation once, and species and reactions
+    /// that can get into one of the mixtures. There are many more species and reactions than any one mixture meets.
     fn fits(&mut self, combination: &[Value], lab: &Elaborator<'_>) -> bool {
-        let [Value::Instance(a), second] = combination else { return true };
-        match second {
-            Value::Instance(b) if self.unordered && self.has(1, *a) && self.has(0, *b) => lab.goes_first(*a, *b),
-            Value::Instance(b) => a != b,
-            Value::Reaction(r) => {
-                let held = self.held(*a, lab);
-                lab.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| held.contains(s))
-            }
-            Value::Species(s) => self.held(*a, lab).contains(s),
-            _ => true,
+        let instance = |v: &Value| if let Value::Instance(id) = v { Some(*id) } else { None };
+        let instances: Vec<InstanceId> = combination.iter().filter_map(instance).collect();
+        if instances.iter().enumerate().any(|(i, id)| instances[..i].contains(id)) {
+            return false;
         }
+        if let Some((i, j)) = self.unordered
+            && let (Some(a), Some(b)) = (instance(&combination[i]), instance(&combination[j]))
+            && self.has(j, a)
+            && self.has(i, b)
+            && !lab.goes_first(a, b)
+        {
+            return false;
+        }
+        if combination.len() == instances.len() {
+            return true;
+        }
+        let mixtures: Vec<InstanceId> = instances.into_iter().filter(|id| lab.per_species(*id)).collect();
+        if mixtures.is_empty() {
+            return true;
+        }
+        let held = self.held(mixtures, lab);
+        combination.iter().all(|value| match value {
+            Value::Reaction(r) => lab.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| held.contains(s)),
+            Value::Species(s) => held.contains(s),
+            _ => true,
+        })
     }
 
     /// Whether a parameter may stand for an instance; those of a set are in their order.
@@ -128,9 +143,12 @@ impl<'a> Tuples<'a> {
         self.sets[parameter].binary_search_by_key(&Some(id), instance).is_ok()
     }
 
-    fn held(&mut self, first: InstanceId, lab: &Elaborator<'_>) -> &BTreeSet<SpeciesId> {
-        let known = self.held.take().filter(|(of, _)| *of == first);
-        let species = || lab.reach.set(&lab.instances[first.0 as usize].name).cloned().unwrap_or_default();
-        &self.held.insert(known.unwrap_or_else(|| (first, species()))).1
+    fn held(&mut self, mixtures: Vec<InstanceId>, lab: &Elaborator<'_>) -> &BTreeSet<SpeciesId> {
+        if self.held.as_ref().is_none_or(|(of, _)| *of != mixtures) {
+            let sets = mixtures.iter().filter_map(|id| lab.reach.set(&lab.instances[id.0 as usize].name));
+            let all = sets.flatten().copied().collect();
+            self.held = Some((mixtures, all));
+        }
+        &self.held.get_or_insert_default().1
     }
 }

@@ -856,6 +856,9 @@ impl<'a> Elaborator<'a> {
                 _ => self.number(1.0, Dimension::any(), false),
             };
         }
+        if let Some(v) = self.property_by_default(s, &name.text) {
+            return self.known_property(s, &name.text, v);
+        }
         let def = self.tables.species.get(s);
         let by = if by_mass { "`specific_heat`" } else { "`heat_capacity`" };
         let wanted = match name.text.as_str() {

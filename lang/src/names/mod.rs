@@ -1,6 +1,7 @@
 //! Modules, declarations and scopes: which item a name stands for.
 
 pub mod imports;
+mod mentioned;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,6 +10,8 @@ use matterix_ir::{Diagnostic, FileId, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
 use crate::{library, near};
+
+pub(crate) use mentioned::{bare, names_in};
 
 /// A module: one file.
 #[derive(Clone, Debug)]

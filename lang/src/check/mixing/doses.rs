@@ -37,6 +37,13 @@ pub(super) struct Dose {
     shares: Vec<(InstanceId, InstanceId, f64)>,
 }
 
+impl Dose {
+    /// Whether its share of a transfer is known.
+    pub(super) fn takes(&self, from: InstanceId, to: InstanceId) -> bool {
+        self.shares.iter().any(|(a, b, _)| (*a, *b) == (from, to))
+    }
+}
+
 impl Walk<'_, '_> {
     /// The dose of an operation; none where nothing flows, or where time or amount cannot be told.
     pub(super) fn dose(&self, o: &Operation, world: &MixtureState) -> Option<Dose> {
@@ -60,6 +67,14 @@ impl Walk<'_, '_> {
     /// Whether something flows already.
     pub(super) fn is_flowing(&self, world: &MixtureState) -> bool {
         !self.eyes.lab.streams.is_empty() && self.flowing(world).is_none_or(|flowing| !flowing.is_empty())
+    }
+
+    /// Whether something flows, or may: processes whose condition is not known before the run, and events.
+    pub(super) fn may_flow(&self, world: &MixtureState) -> bool {
+        let lab = self.eyes.lab;
+        let guard = |process: usize| lab.processes.get(process).and_then(|p| p.guard);
+        let may = |process: usize| guard(process).is_none_or(|g| self.eyes.truth(g, world) != Some(false));
+        !self.by_event.is_empty() || lab.streams.keys().any(|(process, ..)| may(*process))
     }
 
     fn even_flow(&self, lasts: Lasts, world: &MixtureState) -> Option<Dose> {

@@ -1,15 +1,18 @@
 //! H2: hazards that a step brings about, such as a set point above the boiling point of what stands on the plate.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use matterix_ir::model::Domain;
+use matterix_ir::model::{Domain, Event};
 use matterix_ir::plan::{Said, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Span};
+use matterix_ir::{Diagnostic, FileId, Span};
 
 use super::Walk;
+use super::evaluator::NodeEvaluator;
+use super::settled::Settling;
 use super::state::MixtureState;
 use super::uses::Stream;
 use crate::elaborate::hazards::{Hazard, Watched};
@@ -29,6 +32,8 @@ pub(super) struct Hazards {
     since: BTreeMap<usize, (Span, String)>,
     /// By place and hazard of values and transfers: those of its combinations of things that were told there.
     told: BTreeMap<(Span, Span), Vec<usize>>,
+    /// What happens at once before each of them is asked.
+    settling: Settling,
 }
 
 impl Hazards {
@@ -40,11 +45,28 @@ impl Hazards {
             }
         }
         let (present, standing, since, told) = (BTreeSet::new(), BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Hazards { all: all.into(), by_state, present, standing, since, told }
+        Hazards { all: all.into(), by_state, present, standing, since, told, settling: Settling::default() }
+    }
+
+    /// Takes note of the events that set what hazards of the user's own ask for.
+    pub(super) fn settle(&mut self, eyes: &NodeEvaluator<'_, '_>, events: &[Event], library: &BTreeSet<FileId>) {
+        let (settling, reads) = Settling::new(eyes, &self.all, events, library);
+        self.settling = settling;
+        for (i, state) in reads.iter().flat_map(|(i, states)| states.iter().map(|s| (*i, *s))) {
+            let known = self.by_state.entry(state).or_default();
+            if !matches!(self.all[i].watched, Watched::Transfer(..)) && !known.contains(&i) {
+                known.push(i);
+            }
+        }
     }
 }
 
 impl Walk<'_, '_> {
+    /// A moment as a hazard sees it.
+    fn seen_by<'m>(&self, i: usize, world: &'m MixtureState) -> Cow<'m, MixtureState> {
+        self.hazards.settling.settled(i, self.eyes, self.events, world)
+    }
+
     /// Judges the hazards that are there whatever is done: of things as they are, said once for each declaration.
     pub(super) fn endangered(&mut self, world: &MixtureState) {
         let as_it_is = |h: &&Hazard| h.states.is_empty() && h.watched == Watched::Steps;
@@ -95,6 +117,7 @@ impl Walk<'_, '_> {
             let found: Vec<usize> = (0..self.hazards.all.len()).filter(|i| watches(&self.hazards.all[*i])).collect();
             for i in found {
                 let hazard = &self.hazards.all[i];
+                let world = &*self.seen_by(i, world);
                 if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
                     let d = self.hazard(hazard, world, held.span, "dispensed here");
                     self.tell(i, d);
@@ -117,6 +140,7 @@ impl Walk<'_, '_> {
                 _ if self.hazards.standing.contains_key(&i) => self.hazards.standing.get(&i).copied(),
                 _ => continue,
             };
+            let world = &*self.seen_by(i, world);
             if self.eyes.nominal_truth(hazard.when, world) != Some(true) {
                 self.hazards.present.remove(&i);
                 continue;
@@ -168,6 +192,7 @@ impl Walk<'_, '_> {
         world.share = share;
         for i in found {
             let hazard = &self.hazards.all[i];
+            let world = &*self.seen_by(i, world);
             match hazard.watched {
                 Watched::Transfer(.., Some(_)) if self.eyes.nominal_truth(hazard.when, world) == Some(true) => {
                     let words = self.worded(hazard, world).unwrap_or_default();
@@ -184,6 +209,7 @@ impl Walk<'_, '_> {
     /// Tells a hazard of a transfer where the value is used that it is about.
     fn used_after(&mut self, i: usize, world: &MixtureState) {
         let Some((place, words)) = self.hazards.since.remove(&i) else { return };
+        let world = &*self.seen_by(i, world);
         let mut d = self.hazard(&self.hazards.all[i], world, self.place(), "used here");
         if !words.is_empty() {
             d.headline = words;
@@ -197,6 +223,7 @@ impl Walk<'_, '_> {
         if self.hazards.since.contains_key(&i) {
             return self.used_after(i, world);
         }
+        let world = &*self.seen_by(i, world);
         if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
             let said = if matches!(hazard.watched, Watched::Transfer(..)) { "mixed here" } else { "used here" };
             let d = self.hazard(hazard, world, self.place(), said);

@@ -17,6 +17,7 @@ mod lines;
 mod orders;
 mod reactions;
 mod report;
+mod settled;
 mod state;
 mod uses;
 
@@ -38,6 +39,7 @@ use crate::elaborate::hazards::Hazard;
 use crate::eval::Value;
 use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
+use doses::Dose;
 use evaluator::NodeEvaluator;
 use hazards::Hazards;
 use state::{Before, MixtureState};
@@ -140,6 +142,7 @@ pub fn mixing(subject: Subject<'_, '_>, ready: Ready) -> Vec<Diagnostic> {
         found: Vec::new(),
         steps: 0,
     };
+    walk.hazards.settle(&eyes, events, &walk.library);
     let mut world = MixtureState::initial(&eyes, plan.locals.len());
     walk.begin(&mut world);
     walk.fed(&mut world);
@@ -338,7 +341,7 @@ impl Walk<'_, '_> {
                 dose.iter().for_each(|dose| self.pours(dose, &mut world));
                 // What begins may be over when the operation is.
                 if !o.at_start.is_empty() && !o.at_end.is_empty() {
-                    self.streams(&mut world);
+                    self.streams(&dose, &mut world);
                 }
                 for action in &o.at_end {
                     self.action(action, &mut world);
@@ -346,7 +349,7 @@ impl Walk<'_, '_> {
                 // What is over at once leaves the amounts as they are, whatever begins to flow.
                 let at_once = o.takes.is_none() && o.until.is_none() && self.by_event.is_empty();
                 let at_once = at_once.then(|| world.states.clone());
-                self.streams(&mut world);
+                self.streams(&dose, &mut world);
                 world.states = at_once.unwrap_or(world.states);
                 dose.iter().for_each(|dose| self.given_off(dose, &mut world));
                 self.fed(&mut world);
@@ -511,8 +514,8 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// Transfers that processes and events make from now on.
-    fn streams(&mut self, world: &mut MixtureState) {
+    /// Transfers that processes and events make from now on. How much of its source each of them takes is not known, but for those of a dose.
+    fn streams(&mut self, dose: &Option<Dose>, world: &mut MixtureState) {
         let lab = self.eyes.lab;
         let mut active = self.by_event.clone();
         for (process, from, to) in lab.streams.keys() {
@@ -520,6 +523,11 @@ impl Walk<'_, '_> {
             if guard.is_none_or(|g| self.eyes.truth(g, world) != Some(false)) {
                 active.insert((*from, *to));
                 self.flows((*process, *from, *to), world);
+            }
+        }
+        for (from, to) in &active {
+            if !dose.as_ref().is_some_and(|dose| dose.takes(*from, *to)) {
+                self.transfers(*from, *to, f64::NAN, world);
             }
         }
         // One stream may feed the next.
@@ -542,13 +550,13 @@ impl Walk<'_, '_> {
 
     /// What streams carry while a time passes, if that is known.
     fn flow_on(&mut self, time: Option<NodeId>, world: &mut MixtureState) {
-        if !self.is_flowing(world) {
+        if !self.may_flow(world) {
             return;
         }
         let time = time.filter(|_| self.beside == 0).map(|time| self.eyes.value(time, world));
         let dose = time.and_then(|time| self.waited(time, world));
         dose.iter().for_each(|dose| self.pours(dose, world));
-        self.streams(world);
+        self.streams(&dose, world);
         dose.iter().for_each(|dose| self.given_off(dose, world));
         self.fed(world);
         self.endanger(world);

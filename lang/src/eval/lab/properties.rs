@@ -25,9 +25,17 @@ impl<'a> Elaborator<'a> {
         let tables = self.tables;
         let def = tables.species.get(s);
         match &field(def.fields, key)?.value {
-            FieldValue::Expr(e) => Some(self.property_of(def, key, e)),
+            FieldValue::Expr(e) => Some(self.property_of(def, key, (e, def.module))),
             _ => None,
         }
+    }
+
+    /// What holds of a species that does not state a property: the default of its declaration, where that gives one.
+    pub fn property_by_default(&mut self, s: SpeciesId, key: &str) -> Option<Value> {
+        let tables = self.tables;
+        let m = tables.properties.get(key)?;
+        let MemberKind::Value { value: Some(e), .. } = &m.member.kind else { return None };
+        Some(self.property_of(tables.species.get(s), key, (e, m.module)))
     }
 
     /// The number, SI, that a species states; nothing where it states none.
@@ -47,9 +55,9 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// What a species states for a property, as its declared type.
-    fn property_of(&mut self, def: &SpeciesDef<'a>, key: &str, e: &'a Expr) -> Value {
-        let scope = &mut Scope::module(def.module);
+    /// The value of a property of a species, as its declared type, from an expression of a module.
+    fn property_of(&mut self, def: &SpeciesDef<'a>, key: &str, (e, module): (&'a Expr, usize)) -> Value {
+        let scope = &mut Scope::module(module);
         let Some(m) = self.tables.properties.get(key).copied() else { return Value::Error };
         let MemberKind::Value { ty, options, .. } = &m.member.kind else { return Value::Error };
         let ty = self.resolve_type(ty, m.module);
@@ -128,7 +136,7 @@ impl<'a> Elaborator<'a> {
         for f in def.fields {
             if tables.properties.contains_key(f.key.text.as_str()) {
                 match &f.value {
-                    FieldValue::Expr(e) => drop(self.property_of(def, &f.key.text, e)),
+                    FieldValue::Expr(e) => drop(self.property_of(def, &f.key.text, (e, def.module))),
                     _ => self.report(Diagnostic::error(
                         codes::TYPE_MISMATCH,
                         f.span,

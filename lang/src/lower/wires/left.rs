@@ -13,7 +13,7 @@ use super::command_sig;
 use super::hosted::Under;
 use crate::ast::{Clause, ClauseKind, Effect, Expr, ExprKind, Law, LawKind, MemberKind, Role, Type, Wire, WireKind};
 use crate::lower::Planner;
-use crate::names::verb_text;
+use crate::names::{names_in, verb_text};
 
 /// What a driver says to leave a device safe.
 const SAFE: &str = "safe";
@@ -131,29 +131,6 @@ fn named(target: &Expr) -> Option<&str> {
     match &*target.kind {
         ExprKind::Name(name) | ExprKind::Member(_, name) => Some(&name.text),
         _ => None,
-    }
-}
-
-fn names_in<'e>(e: &'e Expr, out: &mut BTreeSet<&'e str>) {
-    match &*e.kind {
-        ExprKind::Name(n) => drop(out.insert(&n.text)),
-        ExprKind::Member(a, n) => {
-            out.insert(&n.text);
-            names_in(a, out);
-        }
-        ExprKind::IndexWord(a, _) | ExprKind::IndexRange(a, ..) | ExprKind::Prime(a) => names_in(a, out),
-        ExprKind::Unary(_, a) | ExprKind::Of(a, _) | ExprKind::As(a, _) => names_in(a, out),
-        ExprKind::Index(a, b) | ExprKind::Binary(_, a, b) | ExprKind::Range(a, b) => {
-            names_in(a, out);
-            names_in(b, out);
-        }
-        ExprKind::Call(_, args) => args.iter().for_each(|a| names_in(&a.value, out)),
-        ExprKind::Fold { set, body, .. } => {
-            names_in(set, out);
-            names_in(body, out);
-        }
-        ExprKind::Tuple(items, _) | ExprKind::List(items) => items.iter().for_each(|i| names_in(i, out)),
-        ExprKind::Error | ExprKind::Number(_) | ExprKind::Quantity(..) | ExprKind::Text(_) | ExprKind::Scoped(_) => {}
     }
 }
 
