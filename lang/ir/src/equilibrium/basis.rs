@@ -125,7 +125,9 @@ impl Basis {
         let formed: Vec<usize> = rows.iter().map(|(pivot, _)| *pivot).collect();
         let is_dissolved = |i: usize| phase(i).is_dissolved() || phase(i) == Phase::Formal;
         let is_master = |i: &usize| is_dissolved(*i) && !formed.contains(i);
-        let masters: Vec<usize> = (0..count).filter(is_master).collect();
+        let mut masters: Vec<usize> = (0..count).filter(is_master).collect();
+        // What much is made of comes last: so most of the linear system stays empty as it is eliminated.
+        masters.sort_by_key(|i| rows.iter().filter(|(_, row)| row.members[*i] != 0.0).count());
         let mut of = vec![vec![0.0; masters.len()]; count];
         let (mut solvent, mut by) = (vec![0.0; count], vec![Vec::new(); count]);
         masters.iter().enumerate().for_each(|(c, i)| of[*i][c] = 1.0);
