@@ -89,6 +89,9 @@ pub(super) struct Basis {
     pub(super) of_held: Vec<Vec<f64>>,
     /// By master: whether no member takes any of it away, so that its total is at least 0.
     pub(super) is_matter: Vec<bool>,
+    /// The masters in the order in which the linear system is eliminated: that which most members are made of comes last, so that most
+    /// of the system stays empty.
+    pub(super) elimination: Vec<usize>,
     /// Whether a member is made of many of one master.
     pub(super) is_steep: bool,
     /// Equations that follow from others.
@@ -125,9 +128,7 @@ impl Basis {
         let formed: Vec<usize> = rows.iter().map(|(pivot, _)| *pivot).collect();
         let is_dissolved = |i: usize| phase(i).is_dissolved() || phase(i) == Phase::Formal;
         let is_master = |i: &usize| is_dissolved(*i) && !formed.contains(i);
-        let mut masters: Vec<usize> = (0..count).filter(is_master).collect();
-        // What much is made of comes last: so most of the linear system stays empty as it is eliminated.
-        masters.sort_by_key(|i| rows.iter().filter(|(_, row)| row.members[*i] != 0.0).count());
+        let masters: Vec<usize> = (0..count).filter(is_master).collect();
         let mut of = vec![vec![0.0; masters.len()]; count];
         let (mut solvent, mut by) = (vec![0.0; count], vec![Vec::new(); count]);
         masters.iter().enumerate().for_each(|(c, i)| of[*i][c] = 1.0);
@@ -166,6 +167,9 @@ impl Basis {
         self.masters_of = self.of.iter().map(|of| of.iter()).collect();
         self.parts = self.of.iter().zip(&self.solvent).map(|(of, solvent)| of.iter().chain([solvent])).collect();
         self.is_steep = self.masters_of.rows().flatten().any(|(_, part)| part.abs() > STEEP);
+        let makes = |c: &usize| self.of.iter().filter(|of| of[*c] != 0.0).count();
+        self.elimination = (0..self.masters.len()).collect();
+        self.elimination.sort_by_key(makes);
         self.is_matter = (0..self.masters.len()).map(|c| self.of.iter().all(|of| of[c] >= 0.0)).collect();
         self
     }

@@ -38,23 +38,43 @@ impl Matrix {
 /// A matrix as the product of two triangles.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Factors {
+    /// What is to be factored.
     pub(super) matrix: Matrix,
-    order: Vec<usize>,
+    /// The rows and columns that are eliminated first, in their order; the others follow as they are.
+    first: Vec<usize>,
+    triangles: Matrix,
+    /// The row of the matrix of each row of the triangles.
+    rows: Vec<usize>,
 }
 
 impl Factors {
+    /// Those of a matrix that is still to be filled in.
+    pub(super) fn in_order(first: &[usize]) -> Factors {
+        Factors { first: first.to_vec(), ..Factors::default() }
+    }
+
     /// Those of a matrix; none where it has no inverse.
     pub(super) fn of(matrix: Matrix) -> Option<Factors> {
-        let mut factors = Factors { matrix, order: Vec::new() };
+        let mut factors = Factors { matrix, ..Factors::default() };
         factors.factor().then_some(factors)
     }
 
-    /// Puts the factors in place of the matrix, with the largest entry of each column as pivot; whether it has an inverse.
+    /// The column of the matrix that is eliminated as the `k`th.
+    fn place(&self, k: usize) -> usize {
+        self.first.get(k).copied().unwrap_or(k)
+    }
+
+    /// Factors the matrix, with the largest entry of each column as pivot; whether it has an inverse.
     pub(super) fn factor(&mut self) -> bool {
         let n = self.matrix.size;
-        self.order.clear();
-        self.order.extend(0..n);
-        let entries = &mut self.matrix.entries;
+        self.rows.clear();
+        self.rows.extend((0..n).map(|k| self.first.get(k).copied().unwrap_or(k)));
+        self.triangles.clear(n);
+        for k in 0..n {
+            let from = self.matrix.row(self.rows[k]);
+            self.triangles.row_mut(k).iter_mut().zip(&self.rows).for_each(|(to, column)| *to = from[*column]);
+        }
+        let entries = &mut self.triangles.entries;
         for k in 0..n {
             let (mut pivot, mut largest) = (k, entries[k * n + k].abs());
             for row in k + 1..n {
@@ -67,7 +87,7 @@ impl Factors {
                 return false;
             }
             if pivot != k {
-                self.order.swap(pivot, k);
+                self.rows.swap(pivot, k);
                 (0..n).for_each(|j| entries.swap(pivot * n + j, k * n + j));
             }
             let (above, below) = entries.split_at_mut((k + 1) * n);
@@ -94,15 +114,17 @@ impl Factors {
     /// The same, in memory that is there.
     pub(super) fn solve_into(&self, right: &[f64], x: &mut Vec<f64>) {
         let n = self.matrix.size;
-        x.clear();
-        x.extend(self.order.iter().map(|row| right[*row]));
+        let mut solved: Vec<f64> = self.rows.iter().map(|row| right[*row]).collect();
         let dot = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
         for k in 0..n {
-            x[k] -= dot(&self.matrix.row(k)[..k], &x[..k]);
+            solved[k] -= dot(&self.triangles.row(k)[..k], &solved[..k]);
         }
         for k in (0..n).rev() {
-            let row = self.matrix.row(k);
-            x[k] = (x[k] - dot(&row[k + 1..], &x[k + 1..])) / row[k];
+            let row = self.triangles.row(k);
+            solved[k] = (solved[k] - dot(&row[k + 1..], &solved[k + 1..])) / row[k];
         }
+        x.clear();
+        x.resize(n, 0.0);
+        solved.into_iter().enumerate().for_each(|(k, value)| x[self.place(k)] = value);
     }
 }

@@ -73,7 +73,8 @@ impl Problem<'_> {
         let places = self.places();
         let mut best = Best { off: f64::INFINITY, x: Vec::new(), state: State::default() };
         let mut idle = 0;
-        let (mut factors, mut right, mut step) = (Factors::default(), Vec::new(), Vec::new());
+        let mut factors = Factors::in_order(&self.basis.elimination);
+        let (mut right, mut step) = (Vec::new(), Vec::new());
         for count in 0..MOST_STEPS {
             let off = largest(&state.residuals);
             if !off.is_finite() {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::basis::Basis;
 use super::formal::Begin;
-use super::linear::{Factors, Matrix};
+use super::linear::Factors;
 use super::problem::{Problem, TEMPERATURES, TRACE, Totals};
 use super::state::State;
 use super::{Layout, System, formal, memo};
@@ -65,9 +65,9 @@ impl Point {
 
     /// How conditions move with the unknowns; none where that has no inverse.
     pub(super) fn factors(&self, problem: &Problem<'_>) -> Option<Factors> {
-        let mut matrix = Matrix::default();
-        problem.jacobian(&self.state, problem.places().count(), &mut matrix);
-        Factors::of(matrix)
+        let mut factors = Factors::in_order(&problem.basis.elimination);
+        problem.jacobian(&self.state, problem.places().count(), &mut factors.matrix);
+        factors.factor().then_some(factors)
     }
 }
 
