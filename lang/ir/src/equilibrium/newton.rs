@@ -4,7 +4,6 @@
 //! start that is very far off is brought near by positive continuous fractions first (Carrayrou, Mose and Behra, AIChE J. 48 (2002)
 //! 894), each total by itself.
 
-use super::linear::Factors;
 use super::problem::{Problem, TEMPERATURES, Totals};
 use super::state::{NO_IONS, State};
 use crate::math;
@@ -73,7 +72,7 @@ impl Problem<'_> {
         let places = self.places();
         let mut best = Best { off: f64::INFINITY, x: Vec::new(), state: State::default() };
         let mut idle = 0;
-        let mut factors = Factors::in_order(&self.basis.elimination);
+        let mut factors = self.linear();
         let (mut right, mut step) = (Vec::new(), Vec::new());
         for count in 0..MOST_STEPS {
             let off = largest(&state.residuals);

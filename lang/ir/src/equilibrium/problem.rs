@@ -85,11 +85,19 @@ pub(super) struct Problem<'a> {
     pub(super) basis: Arc<Basis>,
     /// The logarithm of the activity of a formal member that is held.
     pub(super) limit: f64,
+    /// Whether the linear system is eliminated in the order of its masters, and not in the one that leaves most of it empty.
+    pub(super) as_numbered: bool,
 }
 
 impl<'a> Problem<'a> {
     pub(super) fn new(system: &'a System, args: &'a [f64], basis: Arc<Basis>) -> Self {
-        Problem { system, args, layout: system.layout(), activities: Activities::of(args), basis, limit: 0.0 }
+        let (layout, activities) = (system.layout(), Activities::of(args));
+        Problem { system, args, layout, activities, basis, limit: 0.0, as_numbered: false }
+    }
+
+    /// A linear system that is still to be filled in.
+    pub(super) fn linear(&self) -> Factors {
+        Factors::in_order(if self.as_numbered { &[] } else { &self.basis.elimination })
     }
 
     pub(super) fn places(&self) -> Places {

@@ -65,7 +65,7 @@ impl Point {
 
     /// How conditions move with the unknowns; none where that has no inverse.
     pub(super) fn factors(&self, problem: &Problem<'_>) -> Option<Factors> {
-        let mut factors = Factors::in_order(&problem.basis.elimination);
+        let mut factors = problem.linear();
         problem.jacobian(&self.state, problem.places().count(), &mut factors.matrix);
         factors.factor().then_some(factors)
     }
@@ -81,12 +81,17 @@ pub fn rises(t: f64) -> [f64; Layout::TERMS] {
     [0.0, -1.0 / (t * t), 1.0 / t, 1.0, -2.0 / (t * t * t), 2.0 * t]
 }
 
-/// The solution of a system for its arguments.
+/// The solution of a system for its arguments. Where half-cells leave the potential open it is rounding that leads there or astray: what is
+/// not found is sought once more with the linear system eliminated in another order.
 pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
+    [false, true].into_iter().find_map(|as_numbered| seek(system, args, as_numbered))
+}
+
+fn seek(system: &System, args: &[f64], as_numbered: bool) -> Option<Solution> {
     if args.len() != system.layout().count() || args.iter().any(|v| v.is_nan()) {
         return None;
     }
-    let free = Problem::new(system, args, system.basis.clone());
+    let free = Problem { as_numbered, ..Problem::new(system, args, system.basis.clone()) };
     let lacking = free.lacking();
     let totals = free.totals(&lacking);
     // What could become solvent is none: dry hydroxide holds no water to be dissolved in.
@@ -158,7 +163,7 @@ fn held_at(free: &Problem<'_>, temperature: f64) -> Option<(f64, Solution)> {
     let mut args = free.args.to_vec();
     (args[layout.capacity()], args[layout.heat()]) = (f64::INFINITY, 0.0);
     args[layout.reference()] = temperature;
-    let solution = solve(free.system, &args)?;
+    let solution = seek(free.system, &args, free.as_numbered)?;
     let capacity = free.args[layout.capacity()] + solution.capacity;
     Some((solution.heat + capacity * (temperature - free.reference()), solution))
 }
@@ -198,7 +203,8 @@ fn follow(free: &Problem<'_>, start: &[f64], lacking: &[f64], mut held: Vec<usiz
     for _ in 0..4 * solids.len() + 4 {
         let seek = |replaced: &[usize]| {
             let basis = memo::basis(system, &held, replaced)?;
-            let problem = Problem { limit: free.limit, ..Problem::new(system, args, basis) };
+            let Problem { limit, as_numbered, .. } = *free;
+            let problem = Problem { limit, as_numbered, ..Problem::new(system, args, basis) };
             let totals = problem.totals(lacking);
             let begin = problem.basis.masters.iter().map(|i| known[*i]).chain(others.iter().copied()).collect();
             problem.newton(begin, &totals).map(|(x, state)| (problem, totals, x, state))
