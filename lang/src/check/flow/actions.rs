@@ -59,9 +59,7 @@ impl Interpreter<'_, '_> {
             match truth {
                 // The step fails here: what it needs beyond does not matter any more.
                 Some(_) => {
-                    if !taken {
-                        self.unmet(label, need, facts, false);
-                    }
+                    self.unless_taken(need.failure(), |flow| flow.unmet(label, need, facts, false));
                     return self.failed(need, facts, taken);
                 }
                 None => {
@@ -170,7 +168,7 @@ impl Interpreter<'_, '_> {
 
     /// Whether a handler of the user's takes a failure by name.
     pub fn is_taken(&self, name: &str) -> bool {
-        self.caught.iter().flatten().any(|c| c.as_deref().is_none_or(|c| c == name))
+        self.caught.iter().any(|net| net.takes(name))
     }
 
     /// Forgets states, and what depends on them.
@@ -247,9 +245,7 @@ impl Interpreter<'_, '_> {
             self.limit_taken |= taken;
             match truth {
                 Some(_) => {
-                    if !taken {
-                        self.passed(limit, facts, false);
-                    }
+                    self.unless_taken(condition.failure(), |flow| flow.passed(limit, facts, false));
                     out = self.failed(condition, facts, taken);
                     if out == Asked::Handled {
                         return out;

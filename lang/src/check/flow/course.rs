@@ -490,11 +490,9 @@ impl Interpreter<'_, '_> {
     fn pass_limit(&mut self, index: u32, there: AbstractState, facts: &mut AbstractState) {
         let limit = &self.plan.limits[index as usize];
         let name = limit.condition.failure();
-        if !self.is_taken(name) {
-            let lasts = self.eval(limit.condition.node, facts).truth() == Some(false);
-            let shown = if lasts { facts.clone() } else { there.clone() };
-            self.passed(limit, &shown, false);
-        }
+        let lasts = self.eval(limit.condition.node, facts).truth() == Some(false);
+        let shown = if lasts { facts.clone() } else { there.clone() };
+        self.unless_taken(name, |flow| flow.passed(limit, &shown, false));
         self.limit_taken |= self.is_taken(name);
         let goes_on = !self.is_taken(name) || self.is_shared(limit.condition.node);
         self.raise(name, there);

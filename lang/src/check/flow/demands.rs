@@ -85,14 +85,16 @@ impl Interpreter<'_, '_> {
             if self.eval(condition.node, facts).truth() != Some(false) || self.is_shared(condition.node) {
                 continue;
             }
+            let label = self.called(label);
+            let headline = format!("`{label}` cannot start: `{}` is false", condition.text);
+            let about = Some((condition.span, "must be true throughout"));
+            let tell =
+                |flow: &mut Self| flow.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
+            self.unless_taken("broken", tell);
             if self.is_taken("broken") {
                 self.raise("broken", facts.clone());
                 return Asked::Handled;
             }
-            let label = self.called(label);
-            let headline = format!("`{label}` cannot start: `{}` is false", condition.text);
-            let about = Some((condition.span, "must be true throughout"));
-            self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
             return Asked::Unmet;
         }
         Asked::Met
@@ -191,7 +193,7 @@ impl Interpreter<'_, '_> {
 
     /// A loop that goes on at its last turn.
     pub(super) fn runs_out(&mut self, condition: &Condition, most: f64, facts: &AbstractState) {
-        if self.fails_not(condition, "max", facts) {
+        if self.goes_on_for_ever(condition, facts) {
             let turns = if most == 1.0 { "1 turn".to_string() } else { format!("{} turns", show_number(most)) };
             let headline = format!("`{}` is still true after {turns}: the loop fails with `max`", condition.text);
             let mut is =
@@ -200,7 +202,8 @@ impl Interpreter<'_, '_> {
             let said = if said.is_empty() { "no turns are left".to_string() } else { said.join(", ") };
             let d = self.at_site(codes::NOT_REACHED, headline, said, self.doubt > 0);
             let d = self.with_history(d, condition, facts);
-            self.found(d.help("allow more turns, or handle the failure: `on max { }`"), condition.span);
+            let d = d.help("allow more turns, or handle the failure: `on max { }`");
+            self.unless_taken("max", |flow| flow.found(d, condition.span));
         }
     }
 
@@ -209,12 +212,13 @@ impl Interpreter<'_, '_> {
         if !timeless || most <= MOST_AT_ONCE {
             return self.runs_out(condition, most, facts);
         }
-        if self.fails_not(condition, "max", facts) {
+        if self.goes_on_for_ever(condition, facts) {
             let headline = format!("`{}` stays true in every turn, and no turn takes any time", condition.text);
             let said = "this loop never ends".to_owned();
             let d = self.at_site(codes::ENDLESS_INSTANT, headline, said, self.doubt > 0);
             let d = self.with_history(d, condition, facts);
-            self.found(d.help("let the body wait, or change the condition"), condition.span);
+            let d = d.help("let the body wait, or change the condition");
+            self.unless_taken("max", |flow| flow.found(d, condition.span));
         }
     }
 
@@ -225,11 +229,9 @@ impl Interpreter<'_, '_> {
             && !self.is_shared(condition.node)
     }
 
-    /// The same of a condition that holds.
-    fn fails_not(&mut self, condition: &Condition, failure: &str, facts: &AbstractState) -> bool {
-        self.eval(condition.node, facts).truth() == Some(true)
-            && !self.is_taken(failure)
-            && !self.is_shared(condition.node)
+    /// Whether the condition of a loop holds, and nobody else may see to its end.
+    fn goes_on_for_ever(&mut self, condition: &Condition, facts: &AbstractState) -> bool {
+        self.eval(condition.node, facts).truth() == Some(true) && !self.is_shared(condition.node)
     }
 
     /// A step as the reader wrote it.

@@ -5,6 +5,7 @@ use matterix_ir::{NodeId, Span};
 
 use super::clashing::CLAIMED;
 use super::state::AbstractState;
+use super::swallowed::Net;
 use super::value::{AbstractValue, Imprecision};
 use super::{Interpreter, Raised};
 
@@ -78,8 +79,10 @@ impl Interpreter<'_, '_> {
             Caught::Named(name) => Some(name.clone()),
             Caught::Any => None,
         };
-        let names = guard.handlers.iter().filter(takes).map(name).collect();
-        self.caught.push(if guard.library { Vec::new() } else { names });
+        let taking = || guard.handlers.iter().filter(takes).filter(|_| !guard.library);
+        let any = taking().find(|(caught, _)| *caught == Caught::Any).map(|(_, handler)| *handler);
+        let names = taking().map(name).collect();
+        self.caught.push(Net { names, any, sites: self.sites.len() });
         self.guards.push(Vec::new());
         let takes_clashes = guard.handlers.iter().any(|(caught, _)| match caught {
             Caught::Named(name) => name == CLAIMED,
@@ -114,6 +117,10 @@ impl Interpreter<'_, '_> {
                 self.again.push(Vec::new());
                 let end = self.walk(*handler, entry);
                 let begun = self.again.pop().unwrap_or_default();
+                let raised = self.guards.last().into_iter().flatten();
+                if end.is_some() || !begun.is_empty() || raised.into_iter().any(|(name, _)| self.is_taken(name)) {
+                    self.rescued.insert(*handler);
+                }
                 self.open -= 1;
                 self.doubt -= usize::from(unsure);
                 self.cleaning -= 1;

@@ -24,6 +24,7 @@ pub(super) use self::judged::Judged;
 use super::actions::Asked;
 use super::report::Finding;
 use super::state::AbstractState;
+use super::swallowed::Net;
 use super::value::AbstractValue;
 use super::{Interpreter, MOST_STEPS, Site, Turns};
 use crate::elaborate::hazards::Hazard;
@@ -93,7 +94,7 @@ struct Line<'p> {
     state: State<'p>,
     frames: Vec<Frame<'p>>,
     sites: Vec<Site>,
-    caught: Vec<Vec<Option<String>>>,
+    caught: Vec<Net>,
     kept: Vec<&'p Condition>,
     /// The uses of this moment that it comes behind, and its own, by index.
     behind: BTreeSet<usize>,
@@ -467,13 +468,13 @@ impl<'l> Interpreter<'l, '_> {
                     Caught::Any => None,
                 };
                 let library = self.in_library(node.span);
-                self.caught.push(if library { Vec::new() } else { handlers.iter().map(name).collect() });
+                self.caught.push(Net::of(if library { Vec::new() } else { handlers.iter().map(name).collect() }));
                 let frames = &mut lines.all[at].frames;
                 frames.extend(finally.map(Frame::One));
                 frames.extend([block(0, true), Frame::One(*body)]);
             }
             Step::Try(alternatives) => {
-                self.caught.push(if alternatives.len() > 1 { vec![None] } else { Vec::new() });
+                self.caught.push(Net::of(if alternatives.len() > 1 { vec![None] } else { Vec::new() }));
                 lines.all[at].frames.push(block(0, true));
                 lines.all[at].frames.extend(alternatives.first().map(|first| Frame::One(*first)));
             }
@@ -740,8 +741,8 @@ impl<'l> Interpreter<'l, '_> {
 }
 
 /// Whether handlers take a failure.
-fn takes(caught: &[Vec<Option<String>>], name: &str) -> bool {
-    caught.iter().flatten().any(|taken| taken.as_deref().is_none_or(|taken| taken == name))
+fn takes(caught: &[Net], name: &str) -> bool {
+    caught.iter().any(|net| net.takes(name))
 }
 
 /// Lines go on that waited for lines which have ended.

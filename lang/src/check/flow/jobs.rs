@@ -163,8 +163,12 @@ impl Interpreter<'_, '_> {
             Some(true) => {}
             begun => {
                 let some = begun.is_some();
-                if !self.is_taken("job") {
-                    self.never_began(name, some);
+                if some {
+                    if !self.is_taken("job") {
+                        self.never_began(name, true);
+                    }
+                } else {
+                    self.unless_taken("job", |flow| flow.never_began(name, false));
                 }
                 self.raise("job", facts.clone());
                 if !some {

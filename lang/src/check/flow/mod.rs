@@ -13,6 +13,7 @@
 //! - `fluxes`, `bonds`, `polytope`: reactions and streams by their extents.
 //! - `jobs`, `meantime`, `in_time`, `raced`, `clashing`, `interference`, `beside`, `stopped`: branches and jobs side by side.
 //! - `cases`, `apart`, `trace_partitioning`, `otherwise`: where ways meet, and ways followed one by one.
+//! - `swallowed`: failures that handlers for all failures take for certain.
 //! - `history`, `report`, `program_points`, `reached`, `left`: findings with their stories, and what else is told.
 
 mod actions;
@@ -49,6 +50,7 @@ mod report;
 mod reported;
 mod state;
 mod stopped;
+mod swallowed;
 mod timers;
 mod together;
 mod totals;
@@ -165,8 +167,14 @@ struct Interpreter<'l, 'a> {
     reported: Vec<Vec<Raised>>,
     /// Where handlers that are followed begin their body again: how often, and what is known there; innermost last.
     again: Vec<Vec<(AbstractValue, AbstractState)>>,
-    /// Names of failures that handlers around take; none for every one.
-    caught: Vec<Vec<Option<String>>>,
+    /// What takes failures around, innermost last.
+    caught: Vec<swallowed::Net>,
+    /// Failures for certain that handlers for all failures took.
+    swallowed: Vec<swallowed::Swallowed>,
+    /// Statements below such handlers that came to their end.
+    succeeded: BTreeSet<Span>,
+    /// Handlers and alternatives behind which the run goes on.
+    rescued: BTreeSet<StepId>,
     /// The user's statements around, innermost last.
     sites: Vec<Site>,
     /// Findings are not reported while this is not 0.
@@ -352,6 +360,9 @@ impl<'l, 'a> Interpreter<'l, 'a> {
             reported: Vec::new(),
             again: Vec::new(),
             caught: Vec::new(),
+            swallowed: Vec::new(),
+            succeeded: BTreeSet::new(),
+            rescued: BTreeSet::new(),
             sites: Vec::new(),
             quiet: 0,
             doubt: 0,
@@ -442,6 +453,7 @@ impl<'l, 'a> Interpreter<'l, 'a> {
             self.ends_failed(&begun, &raised);
         }
         self.dead_branches();
+        self.tell_swallowed();
     }
 
     /// What is known when the run begins.

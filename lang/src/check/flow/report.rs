@@ -86,6 +86,22 @@ impl Finding {
         self.by_failure
     }
 
+    /// The same where a handler for all failures takes `failure` each time, or another alternative follows it each time.
+    pub(super) fn taken_by(mut self, handler: Span, failure: Option<&str>) -> Finding {
+        let (label, help) = match failure {
+            Some(name) => (
+                "`on failure` takes this failure each time: the step never succeeds",
+                format!("correct the step; if you expect this failure, name it: `on {name} {{ }}`"),
+            ),
+            None => (
+                "this alternative always runs instead: the step never succeeds",
+                "correct the step, or remove the alternative that always fails".to_owned(),
+            ),
+        };
+        self.diagnostic = self.diagnostic.because(handler, label).help(help);
+        self
+    }
+
     /// The same on some of the ways that lead there.
     pub(super) fn on_some_ways(mut self) -> Finding {
         self.diagnostic.severity = Severity::Warning;

@@ -25,7 +25,7 @@ impl Interpreter<'_, '_> {
         }
         // What must not be may come about at any step, and any motion may not be possible: that is followed where somebody has
         // thought of it.
-        let named = self.caught.iter().flatten().flatten();
+        let named = self.caught.iter().flat_map(|net| &net.names).flatten();
         let by_motion = |name: &str| operation.motion.is_some() && Motion::FAILURES.contains(&name);
         let dangers = named.filter(|name| self.lab.tables.dangers().contains(*name) || by_motion(name));
         let names: Vec<String> = operation.fails.iter().chain(dangers).cloned().collect();

@@ -15,6 +15,7 @@ use super::program_points::at_least;
 use super::report::Finding;
 use super::state::AbstractState;
 use super::stopped::Lines;
+use super::swallowed::Net;
 use super::trace_partitioning::MOST_WAYS;
 use super::turns::{Moment, after_turns, later};
 use super::value::{AbstractValue, Imprecision};
@@ -64,6 +65,7 @@ impl<'l> Interpreter<'l, '_> {
         }
         if let Some(after) = after.as_ref().filter(|_| own) {
             self.outlasts(began, after);
+            self.came_to_end(node.span);
         }
         if let Some(begun) = noted {
             self.end(node, begun, after.as_ref());
@@ -183,13 +185,18 @@ impl<'l> Interpreter<'l, '_> {
                     && let Some(after) =
                         self.breaks_off(condition.node, lasts, longest - waited(&began, &facts), &facts)
                 {
+                    match timeout {
+                        Some(_) => {
+                            self.unless_taken("timeout", |flow| flow.never_held(condition, (lasts, after), true))
+                        }
+                        None => self.never_held(condition, (lasts, after), false),
+                    }
                     // Only the way of the handler goes on.
                     if timeout.is_some() && self.is_taken("timeout") {
                         self.pass(&AbstractValue::point(longest - waited(&began, &facts)), &mut facts);
                         self.raise_written("timeout", node.span, facts);
                         return None;
                     }
-                    self.never_held(condition, (lasts, after), timeout.is_some());
                 }
                 let time = if holds { time } else { at_most(&time, longest) };
                 self.pass(&time, &mut facts);
@@ -197,8 +204,11 @@ impl<'l> Interpreter<'l, '_> {
                 Some(facts)
             }
             Step::Keep { condition, body } => {
-                let fails = self.eval(condition.node, &facts).truth() == Some(false);
-                if fails && self.is_taken("broken") && !self.is_shared(condition.node) {
+                let fails = self.eval(condition.node, &facts).truth() == Some(false) && !self.is_shared(condition.node);
+                if fails {
+                    self.unless_taken("broken", |flow| flow.unexpected(condition, &facts));
+                }
+                if fails && self.is_taken("broken") {
                     // The body does not begin.
                     self.raise("broken", facts);
                     return None;
@@ -207,8 +217,7 @@ impl<'l> Interpreter<'l, '_> {
                 self.widen(*body, &mut broken);
                 self.pass(&AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown), &mut broken);
                 self.raise("broken", broken);
-                if fails && !self.is_shared(condition.node) {
-                    self.unexpected(condition, &facts);
+                if fails {
                     // As if it held: what goes wrong in the body all the same is a mistake of its own.
                     let states = self.parts(condition.node).states.clone();
                     self.forget(&states, &mut facts);
@@ -349,20 +358,22 @@ impl<'l> Interpreter<'l, '_> {
         if value.truth() == Some(false) && !parts.timed && !shared {
             let never = self.eval(condition.node, &facts).truth() == Some(false);
             if never {
-                let taken = self.is_taken("timeout");
-                // Only the way of the handler goes on.
-                if timeout.is_some() && taken {
-                    return None;
+                // A wait without a limit raises nothing that a handler could take.
+                let limited = timeout.is_some();
+                match limited {
+                    true => self.unless_taken("timeout", |flow| flow.never_comes(condition, true, &before, &facts)),
+                    false => self.never_comes(condition, false, &before, &facts),
                 }
-                if !taken {
-                    self.never_comes(condition, timeout.is_some(), &before, &facts);
+                // Only the way of the handler goes on.
+                if limited && self.is_taken("timeout") {
+                    return None;
                 }
                 let states = parts.states.clone();
                 self.forget(&states, &mut facts);
                 return Some(facts);
             }
         }
-        if value.truth() == Some(false) && !shared && !self.is_taken("timeout") {
+        if value.truth() == Some(false) && !shared && !(timeout.is_some() && self.is_taken("timeout")) {
             self.leaves_open(condition.node, (self.site(), condition.span));
         }
         // Another branch may do what is waited for.
@@ -715,7 +726,13 @@ impl<'l> Interpreter<'l, '_> {
         let mut entry = facts.clone();
         for (i, step) in alternatives.iter().enumerate() {
             let last = i + 1 == alternatives.len();
-            self.caught.push(if last { Vec::new() } else { vec![None] });
+            let next = alternatives.get(i + 1).copied();
+            self.caught.push(Net {
+                names: next.map(|_| None).into_iter().collect(),
+                any: next,
+                sites: self.sites.len(),
+            });
+            self.rescued.extend(next);
             self.guards.push(Vec::new());
             self.open += usize::from(i > 0);
             let after = self.walk(*step, entry.clone());
