@@ -11,7 +11,7 @@ fn the_lab_book_is_clean_and_comes_out_right() {
         .map(|entry| entry.expect("an entry").path())
         .collect();
     files.sort();
-    assert_eq!(files.len(), 11);
+    assert_eq!(files.len(), 12);
     for file in files {
         let file = file.to_str().expect("the path is text");
         let checked = matterixc(&["check", file, "--strict", "--no-cache"]);
