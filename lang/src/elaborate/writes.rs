@@ -21,12 +21,16 @@ impl<'a> Elaborator<'a> {
 
     /// The mixture and the species of `m.amount[S]`.
     fn amount_at(&mut self, place: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, SpeciesId)> {
-        let ExprKind::IndexWord(base, word) = &*place.kind else { return None };
+        let (ExprKind::IndexWord(base, _) | ExprKind::Index(base, _)) = &*place.kind else { return None };
         let Value::Method(of, _) = self.expr(base, scope) else { return None };
         let Value::Instance(id) = *of else { return None };
-        let s = match scope.var(&word.text) {
-            Some(Value::Species(s)) => *s,
-            _ => self.tables.species.lookup(self.tables.names, scope.module, word).ok()?,
+        let s = match &*place.kind {
+            ExprKind::IndexWord(_, word) => self.species_meant(word, scope).ok()??,
+            ExprKind::Index(_, index) => match self.expr(index, scope) {
+                Value::Species(s) => s,
+                _ => return None,
+            },
+            _ => return None,
         };
         Some((id, s))
     }

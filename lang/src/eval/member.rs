@@ -8,7 +8,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, Op, Span, codes};
 
 use super::{Num, Scope, Value};
-use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
+use crate::ast::{Expr, ExprKind, FieldValue, ItemKind, MemberKind, Name, NamedExpr, Role};
 use crate::declare::Tables;
 use crate::declare::tables::MemberRef;
 use crate::declare::{SpeciesId, Type};
@@ -562,41 +562,26 @@ impl<'a> Elaborator<'a> {
 
     /// `x[word]`.
     pub fn index(&mut self, base: Value, word: &Name, scope: &mut Scope) -> Value {
-        let species = match scope.var(&word.text) {
-            Some(Value::Species(s)) => Some(*s),
-            Some(Value::Error) => return Value::Error,
-            _ => None,
-        };
+        if let Some(Value::Error) = scope.var(&word.text) {
+            return Value::Error;
+        }
         if let Some(found) = self.grid_index(&base, word, None) {
             return found;
         }
         match base {
             Value::Error => Value::Error,
             Value::Instance(id) | Value::Qualified(id, _) => {
-                let Some(target) = self.indexed(id) else {
-                    let name = self.instances[id.0 as usize].name.clone();
-                    self.report(Diagnostic::error(
-                        codes::TYPE_MISMATCH,
-                        word.span,
-                        format!("`{name}` has no contents with `{}`", word.text),
-                        "it has no contents",
-                    ));
-                    return Value::Error;
-                };
-                match self.species_named(species, word, scope) {
-                    Some(s) => {
-                        self.note_asked(target, s);
-                        Value::Concentration(target, s)
-                    }
+                if self.indexed(id).is_none() {
+                    return self.has_no_contents(id, &word.text, word.span);
+                }
+                match self.species_named(word, scope) {
+                    Some(s) => self.of_species(Value::Instance(id), s, word.span),
                     None => Value::Error,
                 }
             }
-            Value::Method(of, member) => match (*of, self.species_named(species, word, scope)) {
-                (Value::Instance(id), Some(s)) => {
-                    self.note_asked(id, s);
-                    self.amount(id, &member, s)
-                }
-                _ => Value::Error,
+            method @ Value::Method(..) => match self.species_named(word, scope) {
+                Some(s) => self.of_species(method, s, word.span),
+                None => Value::Error,
             },
             list @ (Value::List(_) | Value::Tuple(_)) => {
                 let at = match word.text.parse::<f64>() {
@@ -623,7 +608,45 @@ impl<'a> Elaborator<'a> {
             return self.numbered(base, index, scope);
         }
         let at = self.expr(index, scope);
-        self.element(base, at, index.span)
+        match (&base, &at) {
+            (Value::Error, _) | (_, Value::Error) => Value::Error,
+            (Value::Method(..) | Value::Instance(_) | Value::Qualified(..), Value::Species(s)) => {
+                let name = Name { text: self.tables.species.get(*s).name.clone(), span: index.span };
+                if self.is_refused_as_gas(*s, &name) {
+                    return Value::Error;
+                }
+                self.of_species(base, *s, index.span)
+            }
+            (Value::Method(..), _) => self.expected("a species", &at, index.span),
+            _ => self.element(base, at, index.span),
+        }
+    }
+
+    /// `x[S]`: the concentration of a species in the contents of a thing, or `m.amount[S]`, a quantity of it.
+    fn of_species(&mut self, base: Value, s: SpeciesId, span: Span) -> Value {
+        match base {
+            Value::Instance(id) | Value::Qualified(id, _) => {
+                let Some(target) = self.indexed(id) else {
+                    let name = self.tables.species.get(s).name.clone();
+                    return self.has_no_contents(id, &name, span);
+                };
+                self.note_asked(target, s);
+                Value::Concentration(target, s)
+            }
+            Value::Method(of, member) => {
+                let Value::Instance(id) = *of else { return Value::Error };
+                self.note_asked(id, s);
+                self.amount(id, &member, s)
+            }
+            _ => Value::Error,
+        }
+    }
+
+    fn has_no_contents(&mut self, id: InstanceId, species: &str, span: Span) -> Value {
+        let name = self.instances[id.0 as usize].name.clone();
+        let headline = format!("`{name}` has no contents with `{species}`");
+        self.report(Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "it has no contents"));
+        Value::Error
     }
 
     /// `ot2.slot[3]`, `ot2.slot[1 .. 3]`: places that are numbers.
@@ -673,16 +696,62 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    fn species_named(&mut self, known: Option<SpeciesId>, word: &Name, scope: &Scope) -> Option<SpeciesId> {
-        if known.is_some() {
-            return known.filter(|s| !self.is_refused_as_gas(*s, word));
-        }
-        match self.tables.species.lookup(self.tables.names, scope.module, word) {
-            Ok(s) => Some(s).filter(|s| !self.is_refused_as_gas(*s, word)),
+    /// The species in the brackets of `m.amount[S]`, reported if there is none.
+    fn species_named(&mut self, word: &Name, scope: &Scope) -> Option<SpeciesId> {
+        match self.species_meant(word, scope) {
+            Ok(s) => s.filter(|s| !self.is_refused_as_gas(*s, word)),
             Err(d) => {
                 self.report(*d);
                 None
             }
+        }
+    }
+
+    /// The species that a name means in the brackets of `m.amount[S]`: a parameter, a member of the thing itself, a constant, or else a
+    /// species by its own name; none if its value is an error that was reported.
+    pub fn species_meant(&mut self, word: &Name, scope: &Scope) -> Result<Option<SpeciesId>, Box<Diagnostic>> {
+        let value = self.value_named(word, scope);
+        match value {
+            Some(Value::Species(s)) => return Ok(Some(s)),
+            Some(Value::Error) => return Ok(None),
+            _ => {}
+        }
+        let found = self.tables.species.lookup(self.tables.names, scope.module, word);
+        match (found, value) {
+            (Ok(s), _) => Ok(Some(s)),
+            (Err(_), Some(other)) => {
+                let headline = format!("`{}` is {}, not a species", word.text, other.what());
+                Err(Box::new(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    word.span,
+                    headline,
+                    "a species is expected here",
+                )))
+            }
+            (Err(unknown), None) => Err(unknown),
+        }
+    }
+
+    /// What a name stands for that is no species by its own name, as far as a species may be given to it.
+    fn value_named(&mut self, word: &Name, scope: &Scope) -> Option<Value> {
+        if let Some(value) = scope.var(&word.text) {
+            return Some(value.clone());
+        }
+        if let Some(this) = scope.this
+            && let Some(m) = self
+                .own_member(this, scope.owner, &word.text)
+                .or_else(|| self.members_of(this, &word.text).first().copied())
+            && let MemberKind::Value { role: Role::Param, .. } = &m.member.kind
+        {
+            return Some(self.member_value(this, m, word.span));
+        }
+        if let Some(value) = self.of_lab(&word.text, scope) {
+            return Some(value);
+        }
+        let id = self.lookup(scope.module, &word.text)?;
+        match &self.tables.names.decl(id).item.kind {
+            ItemKind::Const { .. } => Some(self.declared(id, word)),
+            _ => None,
         }
     }
 

@@ -73,6 +73,10 @@ impl<'a> Prose<'a, '_> {
                 format!("{} to {} of {}", from.text, to.text, self.say(base))
             }
             ExprKind::Index(base, index) => {
+                if let Value::Species(s) = self.value(index) {
+                    let species = self.lab.tables.species.get(s).name.clone();
+                    return format!("the concentration of {species} in {}", self.contents_of(base));
+                }
                 let at = match &*index.kind {
                     // Lists count from 0, people from 1.
                     ExprKind::Number(n) => format!("{}", n + 1.0),
@@ -204,15 +208,22 @@ impl<'a> Prose<'a, '_> {
         if self.lab.grid_of(&value).is_some() {
             return format!("{} of {}", word.text, self.say(base));
         }
-        let of = match &*base.kind {
-            // A concentration is one in a vessel, whether its contents are named or not.
+        let species = match self.lab.species_meant(word, &self.scope.clone()) {
+            Ok(Some(s)) => self.lab.tables.species.get(s).name.clone(),
+            _ => word.text.clone(),
+        };
+        format!("the concentration of {species} in {}", self.contents_of(base))
+    }
+
+    /// A concentration is one in a vessel, whether its contents are named or not.
+    fn contents_of(&mut self, base: &'a Expr) -> String {
+        match &*base.kind {
             ExprKind::Member(vessel, part) => match self.value(vessel) {
                 Value::Instance(id) if self.is_contents(id, &part.text) => self.say(vessel),
                 _ => self.say(base),
             },
             _ => self.say(base),
-        };
-        format!("the concentration of {} in {of}", word.text)
+        }
     }
 
     fn function(&mut self, callee: &'a Expr, args: &'a [crate::ast::Arg], e: &'a Expr) -> String {

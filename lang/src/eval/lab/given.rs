@@ -41,7 +41,12 @@ pub fn names_of(e: &Expr) -> std::collections::BTreeSet<&str> {
 fn names_in<'e>(e: &'e Expr, out: &mut Vec<&'e str>) {
     match &*e.kind {
         ExprKind::Name(n) => out.push(&n.text),
-        ExprKind::Member(a, _) | ExprKind::IndexWord(a, _) | ExprKind::IndexRange(a, ..) => names_in(a, out),
+        ExprKind::Member(a, _) | ExprKind::IndexRange(a, ..) => names_in(a, out),
+        // A species may be given as a member: `amount[solute]`.
+        ExprKind::IndexWord(a, word) => {
+            names_in(a, out);
+            out.push(&word.text);
+        }
         ExprKind::Prime(a) | ExprKind::Unary(_, a) | ExprKind::Of(a, _) | ExprKind::As(a, _) => names_in(a, out),
         ExprKind::Index(a, b) | ExprKind::Binary(_, a, b) | ExprKind::Range(a, b) => {
             names_in(a, out);
