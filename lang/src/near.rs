@@ -33,9 +33,9 @@ pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S
                 // Any two letters are one change apart: only another case, a longer or a shorter form is near.
                 0..=2 if candidate.starts_with(&lower) || lower.starts_with(&candidate) => 9,
                 0..=2 => 0,
-                3 => 1,
-                4..=5 => 2,
-                n => n / 3 + 1,
+                // Further apart, as `seal` and `read` are, words have little in common. The first letter is hardly ever a slip.
+                4..=5 if candidate.chars().next() == lower.chars().next() => 2,
+                n => (n / 3).max(1),
             };
             // Of equally near ones that with the same letters in another order is the likelier.
             (distance <= limit).then(|| (distance, !same_letters(&lower, &candidate), c.to_string()))
@@ -88,5 +88,14 @@ mod tests {
     fn letters_that_changed_places_say_enough() {
         assert_eq!(nearest("wiat", ["heat", "what", "wait"]), ["wait"]);
         assert_eq!(nearest("temp", ["time", "temperature"]), ["temperature", "time"]);
+    }
+
+    #[test]
+    fn words_that_differ_in_much_of_their_length_are_not_near() {
+        assert_eq!(nearest("dissolve", ["dispose", "dispense"]), [""; 0]);
+        assert_eq!(nearest("seal", ["read", "heat"]), [""; 0]);
+        assert_eq!(nearest("decant", ["dispose", "dim"]), [""; 0]);
+        assert_eq!(nearest("wate", ["wait", "heat"]), ["wait"]);
+        assert_eq!(nearest("trnasfer", ["transfer", "transport"]), ["transfer"]);
     }
 }

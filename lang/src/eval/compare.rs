@@ -4,7 +4,7 @@ use matterix_ir::plan::Comparison;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Span, UnaryOp, Unit, codes};
 
 use super::{Num, Scope, Value};
-use crate::ast::{Binary, Expr, ExprKind, UnitText};
+use crate::ast::{Binary, Expr, ExprKind, Unary, UnitText};
 use crate::declare::units::unit_error;
 use crate::eval::lab::{Compared, Elaborator};
 
@@ -298,6 +298,12 @@ impl<'a> Elaborator<'a> {
 
     /// `x is word`: a truth value among the members of x.
     pub fn is(&mut self, a: &'a Expr, b: &'a Expr, scope: &mut Scope) -> Value {
+        if let ExprKind::Unary(Unary::Not, _) = &*b.kind {
+            let headline = "`not` stands before the condition";
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, b.span, headline, "not a word that a value can be");
+            self.report(d.help("write `not (x is active)` for `x is not active`"));
+            return Value::Error;
+        }
         let value = self.expr(a, scope);
         if let Value::Enum(..) = value {
             let word = self.like(b, &value, scope);

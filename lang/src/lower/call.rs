@@ -211,7 +211,11 @@ impl<'a> Planner<'a, '_> {
             self.lab.report(import.offered(d));
             return;
         }
-        if let Some(hint) = words.first().and_then(|word| hints::of_verb(&word.text)) {
+        // The second word may read as a label: `switch on plate`.
+        let said = call.words.iter().chain(call.labelled.first().map(|(label, _)| label));
+        let said: Vec<&str> = said.map(|word| word.text.as_str()).collect();
+        if let Some(hint) = hints::of_verb(&said) {
+            let hint = self.with_devices(hint);
             self.lab.report(d.help(hint));
             return;
         }
@@ -223,6 +227,20 @@ impl<'a> Planner<'a, '_> {
         }
         d = near::proposed(d, &near, span);
         self.lab.report(d);
+    }
+
+    /// A hint with the devices of the lab that it may be about; where the lab has none, it says so.
+    fn with_devices(&self, hint: &str) -> String {
+        let mut out = hint.to_owned();
+        for (word, verb) in hints::STANDS_FOR.iter().filter(|(word, _)| hint.contains(word)) {
+            let owners = self.lab.tables.commands(verb).iter().map(|m| m.owner);
+            let mut able = owners.flat_map(|owner| self.lab.instances_of(owner).to_vec());
+            match able.next() {
+                Some(id) => out = out.replace(word, &self.lab.spoken_name(id)),
+                None => out.push_str(&format!("; this lab has no device with the command `{verb}`")),
+            }
+        }
+        out
     }
 
     /// The device that stands after a verb which is not known.

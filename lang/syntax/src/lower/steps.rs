@@ -29,14 +29,20 @@ impl Lower<'_> {
         let mut stmts = Vec::new();
         let mut kids = Kids::of(node);
         let mut before = None;
+        // Whether the rest of a line was found to be wrong already: one mistake is one finding.
+        let mut told = false;
         while let Some(part) = kids.take() {
             let start = part.as_span().start();
+            let was_told = std::mem::take(&mut told);
             match part.as_rule() {
                 Rule::end => continue,
                 Rule::beside if closed_before(&part) => continue,
-                Rule::beside => self.mistakes.rest(Rule::only_stmt, before.unwrap_or(start), &part),
+                Rule::beside => {
+                    self.mistakes.rest(Rule::only_stmt, before.unwrap_or(start), &part);
+                    told = true;
+                }
                 Rule::bad_rest => self.mistakes.rest(Rule::only_stmt, before.unwrap_or(start), &part),
-                Rule::bad_stmt => stmts.push(self.bad_stmt(part, before)),
+                Rule::bad_stmt => stmts.push(self.bad_stmt(part, before, was_told)),
                 _ => {
                     let span = self.span(&part);
                     let kind = self.stmt(part);
@@ -49,9 +55,11 @@ impl Lower<'_> {
     }
 
     /// A step that could not be read: its readable blocks stay, its `let` keeps the name.
-    fn bad_stmt(&mut self, node: Node, before: Option<usize>) -> Stmt {
+    fn bad_stmt(&mut self, node: Node, before: Option<usize>, told: bool) -> Stmt {
         let span = self.span(&node);
-        self.mistakes.line(Rule::only_stmt, before, &node);
+        if !told {
+            self.mistakes.line(Rule::only_stmt, before, &node);
+        }
         let name = let_name(node.as_str()).map(|(at, text)| {
             let start = node.as_span().start() + at;
             Name { text: text.to_owned(), span: self.place(start, start + text.len()) }

@@ -17,6 +17,19 @@ pub(super) fn function_call(spot: &Spot) -> Option<Mistake> {
     Some(Mistake::new(headline, "this reads as a value").help(help))
 }
 
+/// `stir plate at 300 rpm for 5 min`: a step that sets something going ends at once.
+pub(super) fn lasting(spot: &Spot) -> Option<Mistake> {
+    if spot.only != Rule::only_stmt || spot.token != "for" || spot.is_at_start() || RESERVED.contains(&spot.form()) {
+        return None;
+    }
+    let time = spot.after.strip_prefix("for")?.split([';', '{', '}']).next()?.split("//").next()?.trim();
+    if !time.starts_with(|c: char| c.is_ascii_digit()) || !crate::is_step(&format!("wait {time}")) {
+        return None;
+    }
+    let mistake = Mistake::new(format!("`{}` has no duration", spot.form()), "`for` is not expected here");
+    Some(mistake.help(format!("write `wait {time}` as the next step; a device goes on until a step stops it")))
+}
+
 /// `needs cond because "..."`: only a failure with a name is explained.
 pub(super) fn because(spot: &Spot) -> Option<Mistake> {
     let asks = matches!(spot.form(), "needs" | "presumes" | "warns" | "keeps" | "ends");

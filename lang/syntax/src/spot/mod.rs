@@ -78,6 +78,8 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     signs::comment,
     signs::quotes,
     lines::misspelt_step,
+    signs::negated,
+    lines::lasting,
     signs::operator,
     signs::reaction_arrow,
     signs::equals,

@@ -70,6 +70,37 @@ pub(super) fn quotes(spot: &Spot) -> Option<Mistake> {
     Some(mistake.fix("use double quotes", spot.at, spot.at + end + 2, format!("\"{text}\"")))
 }
 
+/// `x not in a .. b` and `x is not open`: what is negated stands in brackets behind `not`.
+pub(super) fn negated(spot: &Spot) -> Option<Mistake> {
+    if spot.token != "not" || spot.is_at_start() {
+        return None;
+    }
+    let rest = spot.after.strip_prefix("not")?.trim_start();
+    let (left, right) = match spot.before.strip_suffix(" is") {
+        Some(left) => (left.trim_end(), format!("is {rest}")),
+        None if rest.starts_with("in ") => (spot.before, rest.to_owned()),
+        None => return None,
+    };
+    // From the last blank outside of brackets to the end of the condition.
+    let mut depth = 0;
+    let start = left.char_indices().rev().find(|(_, c)| {
+        depth += i32::from(matches!(c, ')' | ']')) - i32::from(matches!(c, '(' | '['));
+        depth < 0 || depth == 0 && c.is_whitespace()
+    });
+    let start = start.map_or(0, |(at, c)| at + c.len_utf8());
+    let ends = [" and ", " or ", " {", " timeout ", " else ", " for ", " max ", ")", ";", "//"];
+    let end = ends.iter().filter_map(|end| right.find(end)).min().unwrap_or(right.len());
+    let negated = format!("not ({} {})", left.get(start..)?, right[..end].trim_end());
+    let stop = spot.at + spot.after.len() - (right.len() - right[..end].trim_end().len());
+    let mistake = Mistake::new("`not` stands before the condition", format!("write `{negated}`"));
+    Some(mistake.help(format!("write `{negated}`")).guess(
+        format!("write `{negated}`"),
+        spot.start + start,
+        stop,
+        negated,
+    ))
+}
+
 /// Operators of other languages.
 pub(super) fn operator(spot: &Spot) -> Option<Mistake> {
     const SIGNS: &[(&str, &str)] = &[
