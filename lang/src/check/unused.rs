@@ -9,8 +9,9 @@ use matterix_ir::plan::{Argument, Plan, Step};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Op, Sources, Span, codes};
 
-use crate::ast::{Item, ItemKind, LabLineKind};
+use crate::ast::{AssetLine, Item, ItemKind, LabLineKind, MemberKind, Role};
 use crate::declare::Tables;
+use crate::declare::tables::MemberRef;
 use crate::eval::lab::Elaborator;
 use crate::names::{DeclId, Names, item_name};
 use crate::syntax::relocate::Relocate;
@@ -74,6 +75,9 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
             used.extend(o.claims.iter().copied().chain(o.device).chain(arguments).map(|id| top(lab, id)));
         }
     }
+    if plan.steps.iter().any(|step| matches!(&step.step, Step::Operation(o) if o.motion.is_some())) {
+        used.extend(tops().filter(|id| is_obstacle(lab, *id)));
+    }
     let bonds = bonds(lab, sources, decl.item);
     loop {
         let more: BTreeSet<InstanceId> = bonds
@@ -128,6 +132,26 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
         }
     }
     Some(Uses { things, reagents, said, module: decl.module })
+}
+
+/// Whether a thing only stands in the way of motions, such as a wall or a bench: it has a shape, and neither commands nor readings nor
+/// contents by which a step could use it.
+fn is_obstacle(lab: &Elaborator<'_>, id: InstanceId) -> bool {
+    let instance = &lab.instances[id.0 as usize];
+    let shaped = ["shape", "mesh", "collision"].iter().any(|field| instance.setting(field).is_some())
+        || lab.lines(id).iter().any(|(_, line)| matches!(line, AssetLine::Solid { .. }));
+    let serves = |m: &MemberRef<'_>| {
+        matches!(&m.member.kind, MemberKind::Command { .. } | MemberKind::Value { role: Role::Reading, .. })
+    };
+    let stands_by = |id: InstanceId| !lab.is_mixture(id) && !lab.all_members(id).iter().any(serves);
+    let mut todo = vec![id];
+    shaped
+        && std::iter::from_fn(|| {
+            let next = todo.pop()?;
+            todo.extend(lab.instances[next.0 as usize].children());
+            Some(next)
+        })
+        .all(stands_by)
 }
 
 /// What the steps of a plan name, set or move matter from or to, vessel by vessel.
@@ -381,6 +405,39 @@ mod tests {
             let uses = super::uses(subject.lab, subject.sources, bench.at.1, subject.plan);
             super::things(subject.sources, &[uses.expect("the lab stands in the text")])
         })
+    }
+
+    #[test]
+    fn a_wall_that_arms_pass_is_used() {
+        let lab = |wall: &str, steps: &str| {
+            let text = format!(
+                "use std::glassware::Beaker250mL
+                use std::heating::IkaRetControl
+                use std::robots::{{FrankaPanda, Robotiq2F85}}
+                asset Wall: Body {{ mass: 40 kg, shape: box(20 mm, 800 mm, 900 mm) }}
+                lab bench {{
+                    ambient: 25 degC
+                    table = OpticalTable at (0, 0, 0) m
+                    panda = FrankaPanda {{ gripper: Robotiq2F85 }} on table at (-400, 0) mm
+                    cup = Beaker250mL on table at (100, 0) mm holding 10 g of water
+                    other = {wall} at (1.2, 0, 0) m
+                }}
+                workflow w in bench {{ {steps} }}"
+            );
+            found(&text, |bench| {
+                let subject = bench.subject();
+                let uses = super::uses(subject.lab, subject.sources, bench.at.1, subject.plan);
+                super::things(subject.sources, &[uses.expect("the lab stands in the text")])
+            })
+        };
+        let moved = "pick cup by panda; put back cup by panda";
+        for wall in ["Wall", "LabBench"] {
+            assert_eq!(lab(wall, moved), [""; 0], "{wall}");
+        }
+        // A spare device is one that no step uses, and without a robot nothing is in the way.
+        let spare = "unused: no workflow of this file uses `other`";
+        assert_eq!(lab("IkaRetControl", moved), [spare]);
+        assert!(lab("Wall", "wait 1 s").contains(&spare.to_owned()));
     }
 
     #[test]
