@@ -20,7 +20,12 @@ pub(crate) fn names_in<'e>(e: &'e Expr, out: &mut BTreeSet<&'e str>) {
             out.insert(&n.text);
             names_in(a, out);
         }
-        ExprKind::IndexWord(a, _) | ExprKind::IndexRange(a, ..) | ExprKind::Prime(a) => names_in(a, out),
+        // A species may be given as a member: `amount[solute]`.
+        ExprKind::IndexWord(a, word) => {
+            out.insert(&word.text);
+            names_in(a, out);
+        }
+        ExprKind::IndexRange(a, ..) | ExprKind::Prime(a) => names_in(a, out),
         ExprKind::Unary(_, a) | ExprKind::Of(a, _) | ExprKind::As(a, _) => names_in(a, out),
         ExprKind::Index(a, b) | ExprKind::Binary(_, a, b) | ExprKind::Range(a, b) => {
             names_in(a, out);
