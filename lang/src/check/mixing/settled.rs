@@ -10,9 +10,10 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::evaluator::NodeEvaluator;
 use super::state::MixtureState;
-use crate::elaborate::hazards::Hazard;
+use crate::elaborate::hazards::{Hazard, Watched};
 
-/// The events that set what a hazard asks for, by the index of the hazard. The library's own hazards count what is still to split.
+/// The events that set what a hazard asks for, by the index of the hazard. What the library looks at after each step counts what is still
+/// to split.
 #[derive(Default)]
 pub(super) struct Settling(BTreeMap<usize, Vec<usize>>);
 
@@ -25,14 +26,14 @@ impl Settling {
         library: &BTreeSet<FileId>,
     ) -> (Settling, BTreeMap<usize, BTreeSet<u32>>) {
         let (mut settling, mut reads) = (Settling::default(), BTreeMap::new());
-        let own = |h: &&(usize, &Hazard)| !library.contains(&h.1.span.file);
+        let counts = |hazard: &Hazard| hazard.watched == Watched::Steps && library.contains(&hazard.span.file);
         let mut setters: Option<Setters> = None;
-        for (i, hazard) in hazards.iter().enumerate().collect::<Vec<_>>().iter().filter(own) {
+        for (i, hazard) in hazards.iter().enumerate().filter(|(_, hazard)| !counts(hazard)) {
             let setters = setters.get_or_insert_with(|| Setters::of(eyes, events));
             let (found, read) = setters.below(eyes, events, &hazard.states);
             if !found.is_empty() {
-                settling.0.insert(*i, found.into_iter().collect());
-                reads.insert(*i, read);
+                settling.0.insert(i, found.into_iter().collect());
+                reads.insert(i, read);
             }
         }
         (settling, reads)
