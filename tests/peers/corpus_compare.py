@@ -1,0 +1,281 @@
+"""What an analysis of Opentrons' software does, in a form in which two can be compared.
+
+`deeds` lists what is done: verb, by what, where, how much, how. Two analyses do the same where their lists are the same: in order,
+volumes to 1e-9 uL, heights to 1e-6 mm, flow rates and speeds to 1e-9 of what they are, temperatures and times to 1e-9.
+
+Not compared, as nothing physical: what is loaded, in which order, and what wells are said to hold at first; identifiers and labels;
+that the robot goes home before it does anything, which it does by itself; a second move to where the pipette is; the white space of
+messages; whether a message stands in a delay or before it. Everything else that one analysis has and the other one has not is a
+difference: comments, pauses, delays, lights, homing, moves, blow-outs, touched tips, air gaps.
+
+Places are named by what stands where (slot, module or labware below, and definition); heights count from the bottom, whichever end
+they are given from. Commands at the place of the tip are those of the place it moved to.
+"""
+
+import itertools
+import math
+
+#: Commands that only say what is there.
+SETUP = {"loadLabware", "loadPipette", "loadModule", "loadLiquid", "loadLiquidClass"}
+BIN = "bin"
+
+
+class Reader:
+    """Reads the commands of an analysis one after the other."""
+
+    def __init__(self):
+        self.labware, self.pipettes, self.modules = {}, {}, {}
+        self.at = {}  # by mount: where the tip is
+        self.aimed = {}  # by mount: the area it was moved over
+        self.out = []
+
+    def say(self, verb, *what):
+        self.out.append((verb, *what))
+
+    def on(self, location):
+        """Where something stands."""
+        if isinstance(location, str):
+            return location
+        if "slotName" in location:
+            return str(location["slotName"])
+        if "addressableAreaName" in location:
+            return location["addressableAreaName"]
+        if "moduleId" in location:
+            return self.modules[location["moduleId"]]
+        return self.labware[location["labwareId"]]["where"]
+
+    def load(self, kind, params, result):
+        if kind == "loadLabware":
+            definition = result["definition"]
+            uri = f"{params['namespace']}/{params['loadName']}/{result['definition']['version']}"
+            where = f"{uri} on {self.on(params['location'])}"
+            self.labware[result["labwareId"]] = {"where": where, "wells": definition["wells"], "definition": definition}
+            if "fixedTrash" in definition["parameters"].get("quirks", []):
+                self.labware[result["labwareId"]]["where"] = BIN
+        if kind == "loadPipette":
+            self.pipettes[result["pipetteId"]] = (params["mount"], params["pipetteName"])
+        if kind == "loadModule":
+            slot = "7" if "thermocycler" in params["model"] else str(params["location"]["slotName"])
+            self.modules[result["moduleId"]] = f"{params['model']} on {slot}"
+
+    def spot(self, params):
+        """Labware, well, and where in it: from its axis and its bottom, mm."""
+        labware = self.labware.get(params["labwareId"])
+        if labware is None or labware["where"] == BIN:
+            # Wherever in the bin: it takes everything.
+            return (BIN,)
+        well = labware["wells"][params["wellName"]]
+        location = params.get("wellLocation") or {}
+        offset = {"x": 0, "y": 0, "z": 0, **(location.get("offset") or {})}
+        origin = location.get("origin", "top")
+        base = {"bottom": 0, "center": well["depth"] / 2}.get(origin, well["depth"])
+        if origin not in ("top", "bottom", "center", "default"):
+            base = origin
+        height = base + offset["z"] if not isinstance(base, str) else (base, offset["z"])
+        return labware["where"], params["wellName"], float(offset["x"]), float(offset["y"]), height
+
+    def take(self, command):
+        kind, params, result = command["commandType"], command["params"], command.get("result") or {}
+        if kind in SETUP:
+            return self.load(kind, params, result)
+        mount = self.pipettes[params["pipetteId"]][0] if "pipetteId" in params else None
+        volume = params.get("volume", result.get("volume"))
+        flow = params.get("flowRate")
+        match kind:
+            case "pickUpTip" | "dropTip":
+                spot = self.spot(params)
+                if spot == (BIN,):
+                    self.say("drop tip", mount)
+                else:
+                    # A tip is picked up and given back in one way only.
+                    self.say("pick up tip" if kind == "pickUpTip" else "return tip", mount, *spot[:2])
+                self.at.pop(mount, None)
+            case "moveToAddressableAreaForDropTip" | "moveToAddressableArea":
+                self.aimed[mount] = params["addressableAreaName"]
+                self.at[mount] = (BIN if "rash" in params["addressableAreaName"] else params["addressableAreaName"],)
+                if kind == "moveToAddressableArea":
+                    self.say("move", mount, self.at[mount], None, False, None)
+            case "dropTipInPlace":
+                self.say("drop tip", mount) if self.at.get(mount) == (BIN,) else self.say("drop tip here", mount)
+                self.at.pop(mount, None)
+            case "aspirate" | "dispense" | "blowout":
+                self.at[mount] = self.spot(params)
+                self.say(kind, mount, self.at[mount], volume, flow)
+            case "aspirateInPlace" | "dispenseInPlace" | "blowOutInPlace" | "airGapInPlace":
+                verb = {"aspirateInPlace": "aspirate", "airGapInPlace": "aspirate", "dispenseInPlace": "dispense"}.get(kind, "blowout")
+                self.say(verb, mount, self.at.get(mount), volume, flow)
+            case "touchTip":
+                spot = self.spot(params)
+                self.at[mount] = spot
+                self.say("touch tip", mount, spot, params.get("radius", 1.0), params.get("speed", 60.0))
+            case "moveToWell":
+                spot = self.spot(params)
+                move = ("move", mount, spot, params.get("speed"), bool(params.get("forceDirect")), params.get("minimumZHeight"))
+                if self.at.get(mount) is None or not same(self.at[mount], spot):
+                    self.out.append(move)
+                self.at[mount] = spot
+            case "moveToCoordinates":
+                place = tuple(float(params["coordinates"][axis]) for axis in "xyz")
+                self.at[mount] = place
+                self.say("move", mount, place, params.get("speed"), bool(params.get("forceDirect")), params.get("minimumZHeight"))
+            case "waitForDuration":
+                self.comment(params.get("message"))
+                self.say("wait", params["seconds"])
+            case "waitForResume" | "pause":
+                self.say("pause", " ".join((params.get("message") or "Go on?").split()))
+            case "comment":
+                self.comment(params["message"])
+            case "home":
+                axes = params.get("axes")
+                self.say("home", tuple(sorted(axes)) if axes is not None else "all")
+                self.at.clear()
+            case "setRailLights":
+                self.say("lights", params["on"])
+            case "prepareToAspirate":
+                # The plunger goes to its start; what the tip does next says so.
+                pass
+            case "setTipState":
+                where = self.labware[params["labwareId"]]["where"]
+                self.say("tips", where, tuple(sorted(params["wellNames"])), params["tipWellState"])
+            case "moveLabware":
+                where = self.labware[params["labwareId"]]
+                before = where["where"]
+                to = self.on(params["newLocation"])
+                where["where"] = f"{before.split(' on ')[0]} on {to}"
+                self.say("move labware", before, to, params["strategy"])
+            case _:
+                rest = {key: value for key, value in params.items() if key not in ("pipetteId", "moduleId", "labwareId")}
+                about = self.modules.get(params.get("moduleId"), mount)
+                self.say(kind, about, *frozen(rest))
+
+    def comment(self, message):
+        message = " ".join((message or "").split())
+        if message:
+            self.say("comment", message)
+
+
+def frozen(value):
+    """Parameters as a tuple."""
+    if isinstance(value, dict):
+        return tuple((key, frozen(value[key])) for key in sorted(value))
+    if isinstance(value, list):
+        return tuple(map(frozen, value))
+    return value
+
+
+def deeds(analysis):
+    """What an analysis does."""
+    reader = Reader()
+    for command in analysis["commands"]:
+        reader.take(command)
+    return list(itertools.dropwhile(lambda deed: deed[0] == "home", reader.out))
+
+
+def same(a, b):
+    """Whether two deeds, or parts of them, are the same."""
+    if isinstance(a, bool) or isinstance(b, bool):
+        return a is b
+    if isinstance(a, (int, float)) and isinstance(b, (int, float)):
+        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        if len(a) == len(b) == 5 and isinstance(a[0], str) and " on " in a[0]:
+            # A place in a well.
+            close = all(isinstance(x, float) and isinstance(y, float) and abs(x - y) < 1e-6 for x, y in zip(a[2:], b[2:]))
+            return a[:2] == b[:2] and (close or a[2:] == b[2:])
+        return len(a) == len(b) and all(map(same, a, b))
+    return a == b
+
+
+def volumes(analysis):
+    """What came into each well less what left it, uL."""
+    net = {}
+    for well, change in flows(analysis):
+        net[well] = net.get(well, 0.0) + change
+    return net
+
+
+def flows(analysis):
+    """What comes into and leaves wells, one after the other: well and volume, uL. What is aspirated above a rim is air, and the
+    air that came in last comes out first."""
+    reader, tips = Reader(), {}
+    for command in analysis["commands"]:
+        seen = len(reader.out)
+        reader.take(command)
+        for deed in reader.out[seen:]:
+            verb, mount = deed[0], deed[1] if len(deed) > 1 else None
+            if verb in ("pick up tip", "return tip", "drop tip", "drop tip here"):
+                tips.pop(mount, None)
+            if verb not in ("aspirate", "dispense", "blowout"):
+                continue
+            # Portions in the tip, the last one at its end: volume, and whether it is liquid.
+            tip, spot = tips.setdefault(mount, []), deed[2]
+            labware = spot and len(spot) == 5 and next(l for l in reader.labware.values() if l["where"] == spot[0])
+            if verb == "aspirate":
+                is_liquid = bool(labware) and not (
+                    isinstance(spot[4], float) and spot[4] > labware["wells"][spot[1]]["depth"] + 1e-6
+                )
+                tip.append([deed[3], is_liquid])
+                change = -deed[3] if is_liquid else 0.0
+            else:
+                left, change = (math.inf if verb == "blowout" else deed[3]), 0.0
+                while tip and left > 1e-9:
+                    given = min(left, tip[-1][0])
+                    change += given if tip[-1][1] else 0.0
+                    left -= given
+                    tip[-1][0] -= given
+                    if tip[-1][0] <= 1e-9:
+                        tip.pop()
+            if not labware or not change:
+                continue
+            names = (name for m, name in reader.pipettes.values() if m == mount)
+            channels = 8 if any("multi" in name for name in names) else 1
+            for well in reached(labware, spot[1], channels):
+                yield (labware["where"], well), change
+
+
+def reached(labware, well, channels):
+    """The wells that channels 9 mm apart reach, one for each of them."""
+    wells = labware["wells"]
+    first = wells[well]
+    column = [name for name, w in wells.items() if abs(w["x"] - first["x"]) < 0.1]
+    if channels == 1 or len(column) == 1:
+        return [well] * channels
+    out = []
+    for channel in range(channels):
+        y = first["y"] - 9.0 * channel
+        out += [name for name in column if abs(wells[name]["y"] - y) < 0.5]
+    return out
+
+
+def difference(before, after):
+    """The first thing that two analyses do not do alike, as what kind of difference and as a text; empty where there is none."""
+    a, b = deeds(before), deeds(after)
+    for index, (one, two) in enumerate(itertools.zip_longest(a, b)):
+        if one is not None and two is not None and same(one, two):
+            continue
+        text = f"{index + 1}: {one} became {two}"
+        if one is not None and two is not None and one[0] == two[0]:
+            where = [i for i, (x, y) in enumerate(zip(one, two)) if not same(x, y)] or [0]
+            return f"{one[0]}: another {part(one[0], where[0], one, two)}", text
+        if two is None or (one is not None and two in a[index + 1 : index + 4]):
+            return f"{one[0]} lost", text
+        return f"{two[0]} added", text
+    one, two = volumes(before), volumes(after)
+    for well in sorted(one.keys() | two.keys()):
+        if abs(one.get(well, 0.0) - two.get(well, 0.0)) > 1e-9:
+            return "volume of a well", f"{well}: {one.get(well)} became {two.get(well)}"
+    return "", ""
+
+
+def part(verb, index, one, two):
+    """What a part of a deed says."""
+    if index == 2 and isinstance(one[2], tuple) and isinstance(two[2], tuple) and one[2][:2] == two[2][:2]:
+        return "position in the well"
+    names = {
+        "aspirate": ["", "pipette", "place", "volume", "flow rate"],
+        "move": ["", "pipette", "place", "speed", "way", "clearance"],
+        "touch tip": ["", "pipette", "place", "radius", "speed"],
+    }
+    names["dispense"] = names["blowout"] = names["aspirate"]
+    known = names.get(verb, [])
+    return known[index] if index < len(known) else "value"
