@@ -59,6 +59,7 @@ fn analysis(steps: Vec<Value>) -> Value {
             definition("tubeRack", 4, 6, [DEPTHS[1], 8.7, 1500.0]),
         ),
         json!({ "commandType": "loadPipette", "params": { "pipetteName": "p300_single_gen2", "mount": "left" }, "result": { "pipetteId": "p" } }),
+        json!({ "commandType": "loadPipette", "params": { "pipetteName": "p300_multi_gen2", "mount": "right" }, "result": { "pipetteId": "m" } }),
     ];
     commands.extend(steps);
     json!({ "robotType": "OT-2 Standard", "metadata": { "protocolName": "Fill a column" }, "errors": [], "commands": commands })
@@ -156,6 +157,200 @@ fn more_than_a_well_holds_is_air_for_the_rest() {
     assert!(text.contains("aspirate 80 uL from plate[A1] by ot2.left at bottom + 0.2 mm { partial: true }"), "{text}");
     let checked = matterixc_in(&dir, &["check", "--strict", "a.mtx"]);
     assert_eq!(checked.code, 0, "{}", checked.out);
+}
+
+/// The text that these steps are imported as, which must be without a finding, and what `emit` makes of it.
+fn imported(name: &str, steps: Vec<Value>) -> (String, Value) {
+    let dir = folder(name);
+    write(&dir, "a.json", analysis(steps).to_string());
+    let imported = matterixc_in(&dir, &["import", "opentrons", "a.json", "--out", "a.mtx"]);
+    assert_eq!((imported.code, imported.err.as_str()), (0, ""), "{}", imported.out);
+    let text = std::fs::read_to_string(dir.join("a.mtx")).expect("it is written");
+    let checked = matterixc_in(&dir, &["check", "--strict", "a.mtx"]);
+    assert_eq!(checked.code, 0, "{}\n{text}", checked.out);
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-json"]);
+    assert_eq!(emitted.code, 0, "{}\n{text}", emitted.err);
+    (text, serde_json::from_str(&emitted.out).expect("it is JSON"))
+}
+
+/// Commands of a protocol by name, with the wells that they are about.
+fn wells(protocol: &Value, names: &[&str]) -> Vec<(String, String)> {
+    let text = |value: &Value| value.as_str().unwrap_or("").to_owned();
+    let all = protocol["commands"].as_array().expect("commands").iter();
+    all.map(|c| (text(&c["commandType"]), text(&c["params"]["wellName"])))
+        .filter(|(name, _)| names.contains(&name.as_str()))
+        .collect()
+}
+
+#[test]
+fn one_tip_on_a_pipette_with_eight_channels_works_in_single_wells() {
+    let m = |more: Value| {
+        let mut all = json!({ "pipetteId": "m", "flowRate": 94.0 });
+        if let (Some(all), Value::Object(more)) = (all.as_object_mut(), more) {
+            all.extend(more);
+        }
+        all
+    };
+    let mut steps = Vec::new();
+    for (tip, well) in [("H1", "C3"), ("G1", "E7")] {
+        steps.push(at("pickUpTip", "tips", tip, 0.0, m(json!({}))));
+        steps.push(at("aspirate", "stock", "A1", 1.0 - DEPTHS[1], m(json!({ "volume": 50.0 }))));
+        steps.push(at("dispense", "plate", well, 0.0, m(json!({ "volume": 50.0 }))));
+        steps.push(at("dropTip", "fixedTrash", "A1", 0.0, m(json!({}))));
+    }
+    // Three tips are left over in a column: all of them are taken.
+    for well in ["A2", "B2", "C2", "D2", "E2"] {
+        steps.push(at("pickUpTip", "tips", well, 0.0, json!({})));
+        steps.push(at("dropTip", "fixedTrash", "A1", 0.0, json!({})));
+    }
+    steps.push(at("pickUpTip", "tips", "F2", 0.0, m(json!({}))));
+    steps.push(at("aspirate", "plate", "A12", 1.0 - DEPTHS[0], m(json!({ "volume": 40.0 }))));
+    steps.push(at("dispense", "plate", "D11", 0.0, m(json!({ "volume": 40.0 }))));
+    steps.push(at("dropTip", "fixedTrash", "A1", 0.0, m(json!({}))));
+    let (text, protocol) = imported("single_tip", steps);
+    for line in [
+        "pick up tip tips[H1] by ot2.right",
+        "aspirate 50 uL from stock[A1] by ot2.right",
+        "dispense 50 uL into plate[C3] by ot2.right",
+        "stock = TubeRack24 on ot2.slot[3] holding { A1: 110 uL of water }",
+        "plate = Corning96 on ot2.slot[2] holding { A12 .. C12: 40 uL of water }",
+        "pick up tip [tips[F2], tips[G2], tips[H2]] by ot2.right",
+        "aspirate 40 uL from [plate[A12], plate[B12], plate[C12]] by ot2.right",
+        "dispense 40 uL into [plate[D11], plate[E11], plate[F11]] by ot2.right",
+    ] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    let done = wells(&protocol, &["aspirate", "dispense"]);
+    let expected = ["A1", "C3", "A1", "E7", "A12", "D11"];
+    assert_eq!(done.iter().map(|(_, well)| well.as_str()).collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn columns_of_a_plate_are_said_as_such() {
+    let m = |volume: f64| json!({ "pipetteId": "m", "flowRate": 94.0, "volume": volume });
+    let mut steps = vec![at("pickUpTip", "tips", "A1", 0.0, m(0.0))];
+    for column in 1..=12 {
+        let well = format!("A{column}");
+        steps.push(at("aspirate", "plate", &well, 1.0 - DEPTHS[0], m(50.0)));
+        steps.push(at("dispense", "plate", &well, 0.0, m(50.0)));
+    }
+    steps.push(at("dropTip", "fixedTrash", "A1", 0.0, m(0.0)));
+    let (text, _) = imported("columns", steps);
+    assert!(text.contains("for column in plate.columns {"), "{text}");
+}
+
+#[test]
+fn what_is_aspirated_at_the_rim_is_air() {
+    let mut steps = fill();
+    steps.insert(2, at("aspirate", "stock", "A1", 0.0, json!({ "volume": 5.0, "flowRate": 92.86 })));
+    let (text, _) = imported("at_the_rim", steps);
+    assert!(text.contains("air gap 5 uL by ot2.left"), "{text}");
+    assert!(text.contains("holding { A1: 469 uL of water }"), "{text}");
+}
+
+#[test]
+fn a_tip_may_go_back_with_its_liquid() {
+    let steps = vec![
+        at("pickUpTip", "tips", "A1", 0.0, json!({})),
+        at("aspirate", "stock", "A1", 1.0 - DEPTHS[1], json!({ "volume": 50.0, "flowRate": 92.86 })),
+        at("dispense", "plate", "A1", 0.0, json!({ "volume": 40.0, "flowRate": 92.86 })),
+        at("dropTip", "tips", "A1", 0.0, json!({})),
+    ];
+    let (text, protocol) = imported("wet_tip", steps);
+    assert!(text.contains("return tip to tips[A1] by ot2.left { with_liquid: true }"), "{text}");
+    assert_eq!(wells(&protocol, &["dropTip"]), [("dropTip".to_owned(), "A1".to_owned())]);
+}
+
+#[test]
+fn a_wait_for_the_temperature_that_was_set_is_imported() {
+    let module = json!({
+        "commandType": "loadModule",
+        "params": { "model": "temperatureModuleV2", "location": { "slotName": "4" } },
+        "result": { "moduleId": "t", "model": "temperatureModuleV2" },
+    });
+    let set = |celsius: f64| command("temperatureModule/setTargetTemperature", json!({ "moduleId": "t", "celsius": celsius }));
+    let wait = |celsius: f64| command("temperatureModule/waitForTemperature", json!({ "moduleId": "t", "celsius": celsius }));
+    let stop = command("temperatureModule/deactivate", json!({ "moduleId": "t" }));
+    let (text, _) = imported("waiting", vec![module.clone(), set(37.0), wait(37.0), stop.clone()]);
+    assert!(text.contains("heat cooler to 37 degC\n    settle cooler\n"), "{text}");
+    let dir = folder("waiting_for_another");
+    write(&dir, "a.json", analysis(vec![module, set(37.0), wait(30.0), stop]).to_string());
+    let imported = matterixc_in(&dir, &["import", "opentrons", "a.json"]);
+    assert!(imported.err.contains("it waits for another temperature"), "{}", imported.err);
+}
+
+#[test]
+fn channels_share_what_is_left_in_a_trough() {
+    let dir = folder("shared_trough");
+    let text = |held: &str, options: &str, each: &str| {
+        format!(
+            "mtx 1\nuse std::opentrons::{{Corning96, OT2, P300Multi, Reservoir12, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Multi }} at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[1]
+    trough = Reservoir12 on ot2.slot[2]{held}
+    plate = Corning96 on ot2.slot[3]
+}}
+workflow go in deck {{
+    pick up tip from tips by ot2.left
+    aspirate 140 uL from trough[A1] by ot2.left{options}
+    dispense 140 uL into plate.column(1) by ot2.left
+    expect all(w in plate.column(1): w.contents.volume in {each})
+    drop tip by ot2.left
+}}\n"
+        )
+    };
+    let cases = [
+        (" holding { A1: 1120 uL of water }", "", "139.9 uL .. 140.1 uL"),
+        (" holding { A1: 560 uL of water }", " { partial: true }", "69.9 uL .. 70.1 uL"),
+        // Of nothing each takes nothing.
+        ("", " { partial: true }", "0 uL .. 0.1 uL"),
+    ];
+    for (held, options, each) in cases {
+        write(&dir, "a.mtx", text(held, options, each));
+        let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+        assert_eq!(checked.code, 0, "{held}: {}", checked.out);
+        let run = matterixc_in(&dir, &["run", "a.mtx"]);
+        assert_eq!(run.code, 0, "{held}: {}{}", run.out, run.err);
+    }
+}
+
+#[test]
+fn some_tips_of_a_pipette_reach_as_many_wells() {
+    let dir = folder("some_tips");
+    let text = |lines: &str| {
+        format!(
+            "mtx 1\nuse std::opentrons::{{Corning96, OT2, P300Multi, Reservoir12, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Multi }} at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[1]
+    trough = Reservoir12 on ot2.slot[2] holding {{ A1: 1 mL of water }}
+    plate = Corning96 on ot2.slot[3]
+}}
+workflow go in deck {{
+    {lines}
+    drop tip by ot2.left
+}}\n"
+        )
+    };
+    let take = "aspirate 100 uL from trough[A1] by ot2.left";
+    let cases = [
+        // From the trough only those with a tip take any.
+        (format!("pick up tip tips[H1] by ot2.left\n{take}\nexpect trough[A1].contents.volume in 899 uL .. 901 uL\ndispense 100 uL into plate[D4] by ot2.left\nexpect plate[D4].contents.volume in 99 uL .. 101 uL"), "no findings"),
+        (format!("pick up tip [tips[G1], tips[H1]] by ot2.left\n{take}\ndispense 100 uL into [plate[A1], plate[B1]] by ot2.left"), "no findings"),
+        // As many wells as tips.
+        (format!("pick up tip [tips[G1], tips[H1]] by ot2.left\n{take}\ndispense 100 uL into plate[A1] by ot2.left"), "error[wrong-column]"),
+        (format!("pick up tip from tips by ot2.left\n{take}\ndispense 100 uL into plate[A1] by ot2.left"), "error[wrong-column]"),
+        // The other channels would take tips as well.
+        ("pick up tip tips[A1] by ot2.left".to_owned(), "other channels of `ot2.left` would take tips too"),
+    ];
+    for (lines, why) in cases {
+        write(&dir, "a.mtx", text(&lines));
+        let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+        assert!(flat(&checked.out).contains(why), "{lines}: {}", checked.out);
+    }
 }
 
 #[test]

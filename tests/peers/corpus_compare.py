@@ -4,8 +4,8 @@
 volumes to 1e-9 uL, heights to 1e-6 mm, flow rates and speeds to 1e-9 of what they are, temperatures and times to 1e-9.
 
 Not compared, as nothing physical: what is loaded, in which order, and what wells are said to hold at first; identifiers and labels;
-that the robot goes home before it does anything, which it does by itself; a second move to where the pipette is; the white space of
-messages; whether a message stands in a delay or before it. Everything else that one analysis has and the other one has not is a
+that the robot goes home before it does anything, which it does by itself; a move to where the pipette is, or to where the next step
+goes by itself; the white space of messages; whether a message stands in a delay or before it. Everything else that one analysis has and the other one has not is a
 difference: comments, pauses, delays, lights, homing, moves, blow-outs, touched tips, air gaps.
 
 Places are named by what stands where (slot, module or labware below, and definition); heights count from the bottom, whichever end
@@ -27,6 +27,7 @@ class Reader:
         self.labware, self.pipettes, self.modules = {}, {}, {}
         self.at = {}  # by mount: where the tip is
         self.aimed = {}  # by mount: the area it was moved over
+        self.targets = {}  # by module: what it was set to
         self.out = []
 
     def say(self, verb, *what):
@@ -143,6 +144,13 @@ class Reader:
                 to = self.on(params["newLocation"])
                 where["where"] = f"{before.split(' on ')[0]} on {to}"
                 self.say("move labware", before, to, params["strategy"])
+            case "temperatureModule/setTargetTemperature" | "temperatureModule/waitForTemperature":
+                # A wait without a temperature is for the one that was set.
+                module = self.modules[params["moduleId"]]
+                celsius = params.get("celsius")
+                if kind.endswith("setTargetTemperature"):
+                    self.targets[module] = celsius
+                self.say(kind, module, self.targets.get(module) if celsius is None else celsius)
             case _:
                 rest = {key: value for key, value in params.items() if key not in ("pipetteId", "moduleId", "labwareId")}
                 about = self.modules.get(params.get("moduleId"), mount)
@@ -168,7 +176,16 @@ def deeds(analysis):
     reader = Reader()
     for command in analysis["commands"]:
         reader.take(command)
-    return list(itertools.dropwhile(lambda deed: deed[0] == "home", reader.out))
+    out = list(itertools.dropwhile(lambda deed: deed[0] == "home", reader.out))
+    # What follows at the same place goes there by itself.
+    return [deed for deed, after in itertools.zip_longest(out, out[1:]) if not goes_there(deed, after)]
+
+
+def goes_there(deed, after):
+    """Whether a deed is a plain move to where the next one is done."""
+    if deed[0] != "move" or deed[3:] != (None, False, None) or after is None:
+        return False
+    return after[0] in ("aspirate", "dispense", "blowout") and after[1] == deed[1] and same(after[2], deed[2])
 
 
 def same(a, b):

@@ -48,6 +48,31 @@ pub(super) struct Labware {
     pub(super) order: Vec<String>,
 }
 
+impl Labware {
+    /// The wells in line with one, from back to front.
+    fn column(&self, well: &str) -> Vec<&str> {
+        let Some(first) = self.wells.get(well) else { return Vec::new() };
+        let in_line = |other: &&String| self.wells.get(*other).is_some_and(|o| (o.x - first.x).abs() < 0.1);
+        self.order.iter().filter(in_line).map(String::as_str).collect()
+    }
+
+    /// How many columns it has.
+    fn columns(&self) -> usize {
+        self.order.iter().filter_map(|well| cell(well)).map(|(_, column)| column as usize).max().unwrap_or(0)
+    }
+
+    /// The well that each of so many channels in a row reaches from one, if any.
+    pub(super) fn row(&self, channels: usize, well: &str) -> Vec<Option<&str>> {
+        let column = self.column(well);
+        let first = self.wells.get(well).map_or(0.0, |well| well.y);
+        let at = |channel: usize| {
+            let y = first - PITCH * channel as f64;
+            column.iter().copied().find(|other| self.wells.get(*other).is_some_and(|o| (o.y - y).abs() < 0.5))
+        };
+        (0..channels).map(at).collect()
+    }
+}
+
 /// A pipette on its mount.
 #[derive(Debug)]
 pub(super) struct Mounted {
@@ -173,30 +198,23 @@ impl Deck {
         Err("it is not on a slot of the deck".to_owned())
     }
 
-    /// What a pipette with several channels reaches from a well, or why it is nothing that can be said.
+    /// What so many channels in a row reach from a well, or why it is nothing that can be said.
     pub(super) fn reached(&self, channels: usize, labware: &Labware, well: &str) -> Result<Place, String> {
         let of = labware.name.clone();
         let at = |at| Ok(Place { of: of.clone(), at });
-        let Some(first) = labware.wells.get(well) else { return Err(format!("`{of}` has no well {well}")) };
-        let in_column = |other: &&String| labware.wells.get(*other).is_some_and(|o| (o.x - first.x).abs() < 0.1);
-        let column: Vec<&String> = labware.order.iter().filter(in_column).collect();
+        if !labware.wells.contains_key(well) {
+            return Err(format!("`{of}` has no well {well}"));
+        }
+        let column = labware.column(well);
         if channels == 1 || column.len() == 1 {
             return at(At::Well(well.to_owned()));
         }
-        let reached: Option<Vec<String>> = (0..channels)
-            .map(|channel| {
-                let y = first.y - PITCH * channel as f64;
-                let found =
-                    column.iter().find(|other| labware.wells.get(**other).is_some_and(|o| (o.y - y).abs() < 0.5));
-                found.map(|well| (*well).clone())
-            })
-            .collect();
-        let Some(reached) = reached else {
+        let Some(reached) = labware.row(channels, well).into_iter().collect::<Option<Vec<&str>>>() else {
             return Err("some of its channels reach no well".to_owned());
         };
         match cell(well) {
-            Some((1, number)) if reached.len() == column.len() => at(At::Column(number as usize)),
-            _ => at(At::Wells(reached)),
+            Some((1, number)) if reached.len() == column.len() => at(At::Column(number as usize, labware.columns())),
+            _ => at(At::Wells(reached.into_iter().map(str::to_owned).collect())),
         }
     }
 
@@ -221,7 +239,7 @@ impl Deck {
         match &place.at {
             At::Well(well) => vec![well.clone()],
             At::Wells(wells) => wells.clone(),
-            At::Column(number) => {
+            At::Column(number, _) => {
                 let order = self.named(&place.of).map_or(&[][..], |labware| &labware.order);
                 order.iter().filter(|w| cell(w).is_some_and(|(_, c)| c as usize == *number)).cloned().collect()
             }

@@ -52,6 +52,11 @@ impl Liquids {
         self.tips.remove(pipette);
     }
 
+    /// Whether the tips of a pipette hold any liquid.
+    pub(super) fn is_wet(&self, pipette: &str) -> bool {
+        self.tips.get(pipette).is_some_and(|tip| tip.liquid > 0.0)
+    }
+
     /// Each tip aspirates so much, at a height up to which a well holds `below`; whether the wells hold less.
     pub(super) fn aspirate(
         &mut self,

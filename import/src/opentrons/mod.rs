@@ -104,6 +104,7 @@ fn steps<'a>(
     liquids: Liquids,
 ) -> Steps<'a> {
     let mut steps = Steps::new(analysis, deck, flows, liquids);
+    steps.park(&parked(analysis));
     let is_step = |c: &Command| !c.command_type.starts_with("load");
     // The robot begins at home by itself.
     let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);

@@ -29,8 +29,8 @@ pub(super) struct Place {
 pub(super) enum At {
     /// `A1`.
     Well(String),
-    /// `column(1)`.
-    Column(usize),
+    /// `column(1)`, of so many.
+    Column(usize, usize),
     /// `[A1, C1, E1]`: what several channels reach that is no column.
     Wells(Vec<String>),
 }
@@ -40,7 +40,7 @@ impl std::fmt::Display for Place {
         let of = &self.of;
         match &self.at {
             At::Well(well) => write!(f, "{of}[{well}]"),
-            At::Column(number) => write!(f, "{of}.column({number})"),
+            At::Column(number, _) => write!(f, "{of}.column({number})"),
             At::Wells(wells) => {
                 let all: Vec<String> = wells.iter().map(|well| format!("{of}[{well}]")).collect();
                 write!(f, "[{}]", all.join(", "))
@@ -180,7 +180,7 @@ fn over(steps: &[Node], long: usize, times: usize) -> Option<Node> {
         let all = words.iter().map(|w| (*w).to_owned()).chain(numbered);
         all.into_iter().find(|name| !taken.contains(name.as_str())).unwrap_or_default()
     };
-    let columns = |way: &[&Place]| way.iter().all(|place| matches!(place.at, At::Column(_)));
+    let columns = |way: &[&Place]| way.iter().all(|place| matches!(place.at, At::Column(..)));
     let (header, names) = match ways.as_slice() {
         [way] => {
             let name = if columns(way) { name(&["column"]) } else { name(&["well"]) };
@@ -231,6 +231,10 @@ fn block(header: &str, body: &[Node], mut say: impl FnMut(&Node) -> (String, Vec
 /// Places one after the other, as a range where they are one.
 fn list(way: &[&Place]) -> String {
     let of: BTreeSet<&str> = way.iter().map(|place| place.of.as_str()).collect();
+    let is_next = |(turn, place): (usize, &&Place)| matches!(place.at, At::Column(n, all) if n == turn + 1 && all == way.len());
+    if of.len() == 1 && way.iter().enumerate().all(is_next) {
+        return format!("{}.columns", way[0].of);
+    }
     let wells: Option<Vec<&str>> = way
         .iter()
         .map(|place| match &place.at {

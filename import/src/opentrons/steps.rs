@@ -34,6 +34,12 @@ pub(super) struct Steps<'a> {
     moved: BTreeMap<String, (String, String, f64)>,
     /// Tips that were taken, by rack.
     taken: BTreeMap<String, BTreeSet<String>>,
+    /// Places without a tip, by rack: those that were taken and not returned.
+    absent: BTreeMap<String, BTreeSet<String>>,
+    /// How many channels of a pipette have tips, where it has any.
+    tips: BTreeMap<String, usize>,
+    /// What modules were set to last, degC.
+    targets: BTreeMap<String, f64>,
     /// Modules that shake.
     shaking: BTreeSet<String>,
     /// The flow rates of each pipette that hold where a step says nothing, uL/s.
@@ -72,6 +78,9 @@ impl<'a> Steps<'a> {
             liquids,
             moved: BTreeMap::new(),
             taken: BTreeMap::new(),
+            absent: BTreeMap::new(),
+            tips: BTreeMap::new(),
+            targets: BTreeMap::new(),
             shaking: BTreeSet::new(),
             flows,
         }
@@ -140,12 +149,24 @@ impl<'a> Steps<'a> {
         Ok((mounted, format!("ot2.{}", mounted.mount)))
     }
 
+    /// How many of its tips work at once; where it has none, all its channels.
+    fn channels(&self, command: &Command) -> Result<usize, String> {
+        let all = self.pipette(command)?.0.pipette.channels;
+        Ok(self.tips.get(command.text("pipetteId")).copied().unwrap_or(all))
+    }
+
+    /// Racks that begin without tips.
+    pub(super) fn park(&mut self, racks: &BTreeSet<String>) {
+        for (id, rack) in self.deck.labware.iter().filter(|(id, _)| racks.contains(*id)) {
+            self.absent.insert(id.clone(), rack.order.iter().cloned().collect());
+        }
+    }
+
     /// Where a command works.
     fn spot(&self, command: &Command) -> Result<Spot, String> {
-        let (mounted, _) = self.pipette(command)?;
         let labware = self.deck.labware.get(command.text("labwareId")).ok_or("its labware is not imported")?;
         let well = command.text("wellName");
-        let place = self.deck.reached(mounted.pipette.channels, labware, well)?;
+        let place = self.deck.reached(self.channels(command)?, labware, well)?;
         let depth = labware.wells.get(well).map_or(0.0, |well| well.depth);
         let location = &command.params["wellLocation"];
         let z = location["offset"]["z"].as_f64().unwrap_or(0.0);
@@ -186,20 +207,33 @@ impl<'a> Steps<'a> {
     }
 
     fn pick_up(&mut self, command: &Command) -> Result<(), String> {
-        let (_, by) = self.pipette(command)?;
-        let Spot { place, .. } = self.spot(command)?;
-        let rack = command.text("labwareId").to_owned();
-        let labware = self.deck.labware.get(&rack).ok_or("its rack is not imported")?;
+        let (mounted, by) = self.pipette(command)?;
+        let (id, rack, well) = (command.text("pipetteId"), command.text("labwareId"), command.text("wellName"));
+        let labware = self.deck.labware.get(rack).ok_or("its rack is not imported")?;
         if labware.kind != Kind::Tips {
             return Err(format!("`{}` is not a tip rack", labware.name));
         }
+        // Channels that reach no tip stay without one.
+        let channels = mounted.pipette.channels;
+        let absent = self.absent.entry(rack.to_owned()).or_default();
+        let there = |well: &Option<&str>| well.is_some_and(|well| !absent.contains(well));
+        let row = labware.row(channels, well);
+        let tips = row.iter().filter(|well| there(well)).count();
+        if tips == 0 || !row[..tips].iter().all(there) {
+            return Err("the tips that its channels reach do not begin with the first channel".to_owned());
+        }
+        let place = self.deck.reached(tips, labware, well)?;
         let wells = self.deck.wells_of(&place);
-        let taken = self.taken.entry(rack).or_default();
+        absent.extend(wells.iter().cloned());
+        let taken = self.taken.entry(rack.to_owned()).or_default();
         let next = labware.order.iter().find(|well| !taken.contains(*well));
-        let in_order = next.is_some_and(|next| wells.first() == Some(next)) && taken.len().is_multiple_of(wells.len());
+        let in_order = tips == channels
+            && next.is_some_and(|next| wells.first() == Some(next))
+            && taken.len().is_multiple_of(wells.len());
         taken.extend(wells);
-        self.liquids.empty(command.text("pipetteId"));
-        self.moved.remove(command.text("pipetteId"));
+        self.tips.insert(id.to_owned(), tips);
+        self.liquids.empty(id);
+        self.moved.remove(id);
         match in_order {
             true => self.say(format!("pick up tip from {} by {by}", place.of)),
             false => {
@@ -211,24 +245,37 @@ impl<'a> Steps<'a> {
 
     fn drop(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        self.liquids.empty(command.text("pipetteId"));
+        self.bare(command);
         self.say(format!("drop tip by {by}"))
+    }
+
+    /// A pipette has no tips any more.
+    fn bare(&mut self, command: &Command) {
+        let id = command.text("pipetteId");
+        self.liquids.empty(id);
+        self.moved.remove(id);
+        self.tips.remove(id);
     }
 
     fn give_back(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
         let Spot { place, .. } = self.spot(command)?;
-        self.liquids.empty(command.text("pipetteId"));
-        self.nodes.push(Node::about("return tip to ", place, &format!(" by {by}")));
+        let wells = self.deck.wells_of(&place);
+        if let Some(absent) = self.absent.get_mut(command.text("labwareId")) {
+            absent.retain(|well| !wells.contains(well));
+        }
+        let rest = if self.liquids.is_wet(command.text("pipetteId")) { " { with_liquid: true }" } else { "" };
+        self.bare(command);
+        self.nodes.push(Node::about("return tip to ", place, &format!(" by {by}{rest}")));
         Ok(())
     }
 
     fn aspirate(&mut self, command: &Command) -> Result<(), String> {
-        let (mounted, by) = self.pipette(command)?;
+        let (_, by) = self.pipette(command)?;
         let id = command.text("pipetteId");
         let spot = self.spot(command)?;
-        // What is aspirated above the rim is air.
-        if spot.above > DUST {
+        // What is aspirated at the rim or above it is air.
+        if spot.above > -DUST {
             let is_there = self.moved.get(id).is_some_and(|(labware, well, height)| {
                 labware == command.text("labwareId")
                     && well == command.text("wellName")
@@ -240,7 +287,7 @@ impl<'a> Steps<'a> {
             return self.air_gap(command, &by);
         }
         let below = self.deck.held_below(&spot.place, spot.above + spot.depth);
-        let (how, wells) = ((mounted.pipette.channels, below), self.deck.wells_of(&spot.place));
+        let (how, wells) = ((self.channels(command)?, below), self.deck.wells_of(&spot.place));
         let lacks = self.liquids.aspirate(id, command.volume(), how, &spot.place.of, &wells);
         let more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
         let options = self.options(command, Some(Flow::In), &more);
@@ -251,7 +298,7 @@ impl<'a> Steps<'a> {
     }
 
     fn dispense(&mut self, command: &Command) -> Result<(), String> {
-        let (volume, channels) = (command.volume(), self.pipette(command)?.0.pipette.channels);
+        let (volume, channels) = (command.volume(), self.channels(command)?);
         let before = format!("dispense {} uL into ", number(volume));
         self.give(command, &before, Flow::Out, |liquids, labware, wells| {
             liquids.dispense(command.text("pipetteId"), volume, channels, labware, wells);
@@ -259,7 +306,7 @@ impl<'a> Steps<'a> {
     }
 
     fn blow_out(&mut self, command: &Command) -> Result<(), String> {
-        let channels = self.pipette(command)?.0.pipette.channels;
+        let channels = self.channels(command)?;
         self.give(command, "blow out into ", Flow::Blow, |liquids, labware, wells| {
             liquids.blow_out(command.text("pipetteId"), channels, labware, wells);
         })
@@ -358,6 +405,7 @@ impl<'a> Steps<'a> {
             return Err("only a whole rack is refilled".to_owned());
         }
         self.taken.remove(id);
+        self.absent.remove(id);
         self.say(format!("refill {}", rack.name))
     }
 
@@ -372,10 +420,16 @@ impl<'a> Steps<'a> {
             "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
                 Err("it holds a temperature for a time".to_owned())
             }
-            "setTargetTemperature" | "setTargetBlockTemperature" => self.say(format!("heat {name} to {celsius} degC")),
-            "waitForTemperature" | "waitForBlockTemperature" if celsius.is_empty() => {
+            "setTargetTemperature" | "setTargetBlockTemperature" => {
+                self.targets.extend(command.number("celsius").map(|celsius| (name.clone(), celsius)));
+                self.say(format!("heat {name} to {celsius} degC"))
+            }
+            "waitForTemperature" | "waitForBlockTemperature"
+                if command.number("celsius").is_none_or(|celsius| self.targets.get(&name) == Some(&celsius)) =>
+            {
                 self.say(format!("settle {name}"))
             }
+            "waitForTemperature" => Err("it waits for another temperature than the module was set to".to_owned()),
             "deactivate" | "deactivateHeater" | "deactivateBlock" => self.say(format!("stop heating {name}")),
             "engage" => {
                 let height = command.number("height").ok_or("it gives no height")?;
