@@ -139,7 +139,7 @@ fn what_cannot_be_said_is_listed_and_stands_in_the_text() {
     write(&dir, "a.json", analysis(steps).to_string());
     let imported = matterixc_in(&dir, &["import", "opentrons", "a.json"]);
     assert_eq!(imported.code, 0, "{}", imported.err);
-    assert!(imported.err.contains("moveToCoordinates (command 9)"), "{}", imported.err);
+    assert!(imported.err.contains("moveToCoordinates (command 10)"), "{}", imported.err);
     assert!(imported.out.contains("// not imported: moveToCoordinates, as "), "{}", imported.out);
 }
 
@@ -268,8 +268,11 @@ fn a_wait_for_the_temperature_that_was_set_is_imported() {
         "params": { "model": "temperatureModuleV2", "location": { "slotName": "4" } },
         "result": { "moduleId": "t", "model": "temperatureModuleV2" },
     });
-    let set = |celsius: f64| command("temperatureModule/setTargetTemperature", json!({ "moduleId": "t", "celsius": celsius }));
-    let wait = |celsius: f64| command("temperatureModule/waitForTemperature", json!({ "moduleId": "t", "celsius": celsius }));
+    let set = |celsius: f64| {
+        command("temperatureModule/setTargetTemperature", json!({ "moduleId": "t", "celsius": celsius }))
+    };
+    let wait =
+        |celsius: f64| command("temperatureModule/waitForTemperature", json!({ "moduleId": "t", "celsius": celsius }));
     let stop = command("temperatureModule/deactivate", json!({ "moduleId": "t" }));
     let (text, _) = imported("waiting", vec![module.clone(), set(37.0), wait(37.0), stop.clone()]);
     assert!(text.contains("heat cooler to 37 degC\n    settle cooler\n"), "{text}");
@@ -338,11 +341,27 @@ workflow go in deck {{
     let take = "aspirate 100 uL from trough[A1] by ot2.left";
     let cases = [
         // From the trough only those with a tip take any.
-        (format!("pick up tip tips[H1] by ot2.left\n{take}\nexpect trough[A1].contents.volume in 899 uL .. 901 uL\ndispense 100 uL into plate[D4] by ot2.left\nexpect plate[D4].contents.volume in 99 uL .. 101 uL"), "no findings"),
-        (format!("pick up tip [tips[G1], tips[H1]] by ot2.left\n{take}\ndispense 100 uL into [plate[A1], plate[B1]] by ot2.left"), "no findings"),
+        (
+            format!(
+                "pick up tip tips[H1] by ot2.left\n{take}\nexpect trough[A1].contents.volume in 899 uL .. 901 uL\ndispense 100 uL into plate[D4] by ot2.left\nexpect plate[D4].contents.volume in 99 uL .. 101 uL"
+            ),
+            "no findings",
+        ),
+        (
+            format!(
+                "pick up tip [tips[G1], tips[H1]] by ot2.left\n{take}\ndispense 100 uL into [plate[A1], plate[B1]] by ot2.left"
+            ),
+            "no findings",
+        ),
         // As many wells as tips.
-        (format!("pick up tip [tips[G1], tips[H1]] by ot2.left\n{take}\ndispense 100 uL into plate[A1] by ot2.left"), "error[wrong-column]"),
-        (format!("pick up tip from tips by ot2.left\n{take}\ndispense 100 uL into plate[A1] by ot2.left"), "error[wrong-column]"),
+        (
+            format!("pick up tip [tips[G1], tips[H1]] by ot2.left\n{take}\ndispense 100 uL into plate[A1] by ot2.left"),
+            "error[wrong-column]",
+        ),
+        (
+            format!("pick up tip from tips by ot2.left\n{take}\ndispense 100 uL into plate[A1] by ot2.left"),
+            "error[wrong-column]",
+        ),
         // The other channels would take tips as well.
         ("pick up tip tips[A1] by ot2.left".to_owned(), "other channels of `ot2.left` would take tips too"),
     ];

@@ -144,11 +144,16 @@ class Case:
         return self.stage("compare", code + digest(self.file("engine.json"), self.file("again.json")), make)
 
     def fault(self, errors):
-        """Which faults of the protocol's explain all errors that `check` reports; none where one stays unexplained."""
-        if not errors or not all(error["code"] in ("volume-overflow", "volume-underflow") for error in errors):
-            return None
-        known = faults(json.loads(self.file("engine.json").read_text()))
-        return sorted(known) if known and any(kind in e["code"] for e in errors for kind, _ in known) else None
+        """The faults of the protocol's that explain all errors that `check` reports, well by well; none where one stays unexplained."""
+        known = faults(json.loads(self.file("engine.json").read_text())) if errors else []
+        found = []
+        for error in errors:
+            label = re.search(r"`\w+\[(\w+)\]`", error["text"])
+            same = [f for f in known if label and f"volume-{f[0]}" == error["code"] and f[1].startswith(f"{label[1]} of ")]
+            if not same:
+                return None
+            found += same
+        return sorted(found)
 
     def outcome(self, upto):
         """What became of it: `pass`, `fault`, `uncounted` or `fail`, and why."""

@@ -93,10 +93,15 @@ impl<'p> Deck<'p> {
         let plain: String =
             self.scene.get(instance).name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let base = plain.trim_matches('_').to_ascii_lowercase();
-        let taken =
-            |id: &str| RESERVED.contains(&id) || id.starts_with("liquid_") || self.loaded.values().any(|l| l.id == id);
+        // Liquids are `liquid_1` and so on; whatever is called so gets another number.
+        let is_liquid = |id: &str| {
+            id.strip_prefix("liquid_").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+        };
+        let taken = |id: &str| RESERVED.contains(&id) || is_liquid(id) || self.loaded.values().any(|l| l.id == id);
+        // `liquid_2` would be a liquid for every number.
+        let stem = if base == "liquid" { "liquid_" } else { &base };
         let id = (1..)
-            .map(|n| if n == 1 { base.clone() } else { format!("{base}_{n}") })
+            .map(|n| if n == 1 { base.clone() } else { format!("{stem}_{n}") })
             .find(|id| !taken(id))
             .unwrap_or(base.clone());
         self.loaded.insert(instance, Loaded { id: id.clone(), about });

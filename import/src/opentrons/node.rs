@@ -231,7 +231,8 @@ fn block(header: &str, body: &[Node], mut say: impl FnMut(&Node) -> (String, Vec
 /// Places one after the other, as a range where they are one.
 fn list(way: &[&Place]) -> String {
     let of: BTreeSet<&str> = way.iter().map(|place| place.of.as_str()).collect();
-    let is_next = |(turn, place): (usize, &&Place)| matches!(place.at, At::Column(n, all) if n == turn + 1 && all == way.len());
+    let is_next =
+        |(turn, place): (usize, &&Place)| matches!(place.at, At::Column(n, all) if n == turn + 1 && all == way.len());
     if of.len() == 1 && way.iter().enumerate().all(is_next) {
         return format!("{}.columns", way[0].of);
     }

@@ -613,10 +613,12 @@ impl<'a> Elaborator<'a> {
             let Value::Num(size) = self.member_value(from, m, at) else { return None };
             let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
             self.note_place(share, call.span);
-            // What follows what is left takes nothing of nothing.
+            // What follows what is left takes nothing of nothing; what moves at once may be nothing in an empty vessel, too, which has no amounts.
             let left = |(key, _): &(&crate::eval::lab::ExtensiveKey, &u32)| key.instance == from;
             let left: BTreeSet<u32> = self.extensive.iter().filter(left).map(|(_, state)| *state).collect();
-            if self.graph.depends(q.node, |op| matches!(op, Op::State(s) if left.contains(s))) {
+            let is_positive = self.graph.constant(q.node).is_some_and(|amount| amount > 0.0);
+            let follows = self.graph.depends(q.node, |op| matches!(op, Op::State(s) if left.contains(s)));
+            if follows || (!rate && !is_positive) {
                 let zero = self.graph.number(0.0);
                 let nothing = self.graph.binary(BinaryOp::Le, q.node, zero);
                 share = self.graph.select(nothing, q.node, share);
