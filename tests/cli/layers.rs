@@ -104,3 +104,16 @@ species X { formula: \"I2\", dissolved_in: L }\nequilibrium x: I2 <-> X { partit
         assert!(checked.code == 1 && flat(&checked.out).contains(why), "{before}: {}", checked.out);
     }
 }
+
+/// What is put in as dissolved in a liquid that is not there is in the water, as with the last trace of that liquid.
+#[test]
+fn without_its_liquid_a_species_goes_into_the_water() {
+    let acid = "species HB { formula: \"C7H6O2\", molar_volume: 96 mL/mol, heat_capacity: 147 J/(mol*K) }
+species HB_org { formula: \"C7H6O2\", dissolved_in: CHCl3, molar_volume: 96 mL/mol, heat_capacity: 147 J/(mol*K) }
+species B- { formula: \"C7H5O2-\", molar_volume: 96 mL/mol, heat_capacity: 147 J/(mol*K) }
+equilibrium extracts: HB <-> HB_org { partition: 10 }
+equilibrium splits: HB <-> H+ + B- { pka: 4.2 }";
+    let said = "expect acidity(cup.contents) in 2.74 .. 2.77; expect cup.contents.amount[HB_org] < 1 umol";
+    runs("none", lab(acid, "100 g of water + 5 mmol of HB_org", said));
+    runs("trace", lab(acid, "100 g of water + 1 ug of CHCl3 + 5 mmol of HB_org", said));
+}

@@ -484,3 +484,34 @@ fn conductivities_of_ions_that_pair_are_told() {
         assert!(said.contains("of two negative charges pair") == told, "{uses}, {holding}: {said}");
     }
 }
+
+/// What a lab declares is ready at its temperature, also where acid and base are declared together, however little water there is.
+#[test]
+fn acid_and_base_declared_together_have_the_temperature_declared() {
+    let held = [
+        "100 g of water + 10 mmol of NaOH + 9 mmol of HCl",
+        "100 g of water + 500 mmol of NaOH + 450 mmol of HCl",
+        "100 g of water + 450 mmol of HCl + 500 mmol of NaOH",
+        "100 g of water + 100 mmol of H2SO4 + 190 mmol of NaOH",
+        "100 g of water + 500 mmol of NaOH + 450 mmol of acetic_acid",
+        "100 g of water + 1 mol of NaOH + 900 mmol of HCl",
+        "70 g of water + 1 mol of NaOH + 900 mmol of acetic_acid",
+        "100 g of water + 500 mmol of Na+ + 500 mmol of OH- + 450 mmol of H+ + 450 mmol of Cl-",
+    ];
+    let mut text = "mtx 1\nuse std::equilibria\nuse std::glassware::Beaker250mL\nasset Iso: Beaker250mL { contents: { air: 0 W/K }, wall: 0 W/K }\nlab bench {\n    ambient: 25 degC\n".to_string();
+    for (i, holding) in held.iter().enumerate() {
+        for (name, at) in [("warm", 25), ("cold", 10)] {
+            text += &format!("    {name}{i} = Iso at ({i}, {at}, 0) m holding {holding} at {at} degC\n");
+        }
+    }
+    text += "}\nworkflow look in bench {\n    wait 1 s\n";
+    for i in 0..held.len() {
+        text += &format!("    expect warm{i}.contents.temperature in 24.999 degC .. 25.001 degC\n");
+        text += &format!("    expect cold{i}.contents.temperature in 9.999 degC .. 10.001 degC\n");
+    }
+    text += "}\n";
+    let file = write(&folder("solutions_declared_together"), "a.mtx", &text);
+    let ran = matterixc(&["run", &file]);
+    let met = ran.out.matches("  ok  ").count();
+    assert_eq!(met, 2 * held.len(), "{}{}", ran.out, ran.err);
+}

@@ -129,11 +129,7 @@ impl<'a> Elaborator<'a> {
         let equilibria: Vec<usize> = (0..self.tables.equilibria.len())
             .filter(|e| {
                 let def = &self.tables.equilibria[*e];
-                let is_here = |s: &SpeciesId| {
-                    let liquid = self.tables.species.get(*s).liquid;
-                    here.contains_key(s) && liquid.is_none_or(|liquid| here.contains_key(&liquid))
-                };
-                def.gas.is_none() && def.terms.iter().all(|(s, _)| is_here(s) || self.is_formal(*s))
+                def.gas.is_none() && def.terms.iter().all(|(s, _)| here.contains_key(s) || self.is_formal(*s))
             })
             .collect();
         let water = here.keys().copied().find(|s| self.tables.species.get(*s).is_water)?;

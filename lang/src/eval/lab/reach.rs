@@ -177,8 +177,10 @@ fn close(set: &mut BTreeSet<SpeciesId>, tables: &Tables<'_>) {
                 let mut side = e.terms.iter().filter(|(_, n)| (*n < 0.0) == left);
                 side.all(|(s, _)| set.contains(s) || tables.species.get(*s).is_water || is_formal(s))
             };
-            let has_liquid =
-                e.terms.iter().all(|(s, _)| tables.species.get(*s).liquid.is_none_or(|liquid| set.contains(&liquid)));
+            // What was put in without its liquid goes into the water.
+            let has_liquid = e.terms.iter().all(|(s, _)| {
+                tables.species.get(*s).liquid.is_none_or(|liquid| set.contains(&liquid) || set.contains(s))
+            });
             let is_wet = e.terms.iter().all(|(s, _)| !tables.species.get(*s).is_water || set.contains(s));
             if is_wet && has_liquid && (is_there(true) || is_there(false)) {
                 set.extend(e.terms.iter().map(|t| t.0).filter(|s| !is_formal(s)));
