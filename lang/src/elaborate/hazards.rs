@@ -8,6 +8,7 @@ use matterix_ir::plan::{Said, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Severity, Span, codes};
 
+use super::tuples::{Tuples, has};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
 use crate::declare::Tables;
 use crate::declare::Type;
@@ -244,10 +245,19 @@ impl<'a> Elaborator<'a> {
 
     fn of_transfers(&mut self, declared: Declared<'a>, share: &Expr, ends: (&Expr, &Expr), out: &mut Vec<Hazard>) {
         let (Some(share), Some(from), Some(to)) = (bare(share), bare(ends.0), bare(ends.1)) else { return };
+        let Declared { params, module, name, when, .. } = declared;
+        let sets = self.sets(params, module);
         for (a, b) in self.moves.clone() {
-            let ends = [(from, a), (to, b)];
-            let Declared { params, module, name, when, .. } = declared;
-            let mut tuples = self.tuples_with(params, (module, name), when, &ends);
+            // The ends are known, and which is which as well.
+            let narrowed = params.iter().zip(&sets).map(|(p, set)| {
+                let end = [(from, a), (to, b)].into_iter().find(|(name, _)| *name == p.name.text);
+                match end {
+                    Some((_, id)) if has(set, id) => vec![Value::Instance(id)],
+                    Some(_) => Vec::new(),
+                    None => set.clone(),
+                }
+            });
+            let mut tuples = Tuples::new(params, (module, name), Some(when), narrowed.collect(), None);
             while let Some((mut scope, shown)) = tuples.next(self) {
                 let value = self.share_moved();
                 scope.bind(share.to_string(), value);

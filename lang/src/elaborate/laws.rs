@@ -131,7 +131,7 @@ impl<'a> Elaborator<'a> {
         guard: Option<&'a Expr>,
         name: &'a Name,
     ) -> Tuples<'a> {
-        let sets: Vec<Vec<Value>> = params.iter().map(|p| self.fitting(p, module)).collect();
+        let sets = self.sets(params, module);
         let is_instance = |set: &Vec<Value>| matches!(set.first(), Some(Value::Instance(_)));
         let instances: Vec<&str> =
             params.iter().zip(&sets).filter(|(_, set)| is_instance(set)).map(|(p, _)| p.name.text.as_str()).collect();
@@ -144,31 +144,11 @@ impl<'a> Elaborator<'a> {
         Tuples::new(params, (module, name), guard, sets, unordered)
     }
 
-    /// The tuples in which some parameters stand for instances that are known, in an order that is known as well.
-    pub(super) fn tuples_with(
-        &mut self,
-        params: &'a [Param],
-        (module, name): (usize, &'a Name),
-        guard: &'a Expr,
-        known: &[(&str, InstanceId)],
-    ) -> Tuples<'a> {
-        let set = |p: &'a Param| match known.iter().find(|(name, _)| *name == p.name.text) {
-            Some((_, id)) if self.is_fitting(p, module, *id) => vec![Value::Instance(*id)],
-            Some(_) => Vec::new(),
-            None => self.fitting(p, module),
-        };
-        let sets = params.iter().map(set).collect();
-        Tuples::new(params, (module, name), Some(guard), sets, None)
+    /// What each parameter may stand for, instances in their order.
+    pub(super) fn sets(&mut self, params: &'a [Param], module: usize) -> Vec<Vec<Value>> {
+        params.iter().map(|p| self.fitting(p, module)).collect()
     }
 
-    fn is_fitting(&mut self, p: &'a Param, module: usize, id: InstanceId) -> bool {
-        let Some(Type::Instance { kinds, .. }) = p.ty.as_ref().map(|ty| self.resolve_type(ty, module)) else {
-            return false;
-        };
-        kinds.iter().all(|k| self.instance_is(id, *k))
-    }
-
-    /// What a parameter may stand for.
     fn fitting(&mut self, p: &'a Param, module: usize) -> Vec<Value> {
         match p.ty.as_ref().map(|ty| self.resolve_type(ty, module)) {
             Some(Type::Instance { kinds, .. }) => (0..self.instances.len() as u32)

@@ -109,13 +109,12 @@ impl<'a> Tuples<'a> {
     /// Whether what a law is about goes together: different instances, each pair of a symmetric relation once, and species and reactions
     /// that can get into one of the mixtures. There are many more species and reactions than any one mixture meets.
     fn fits(&mut self, combination: &[Value], lab: &Elaborator<'_>) -> bool {
-        let instance = |v: &Value| if let Value::Instance(id) = v { Some(*id) } else { None };
-        let instances: Vec<InstanceId> = combination.iter().filter_map(instance).collect();
+        let instances: Vec<InstanceId> = combination.iter().filter_map(Value::instance).collect();
         if instances.iter().enumerate().any(|(i, id)| instances[..i].contains(id)) {
             return false;
         }
         if let Some((i, j)) = self.unordered
-            && let (Some(a), Some(b)) = (instance(&combination[i]), instance(&combination[j]))
+            && let (Some(a), Some(b)) = (combination[i].instance(), combination[j].instance())
             && self.has(j, a)
             && self.has(i, b)
             && !lab.goes_first(a, b)
@@ -139,8 +138,7 @@ impl<'a> Tuples<'a> {
 
     /// Whether a parameter may stand for an instance; those of a set are in their order.
     fn has(&self, parameter: usize, id: InstanceId) -> bool {
-        let instance = |v: &Value| if let Value::Instance(i) = v { Some(*i) } else { None };
-        self.sets[parameter].binary_search_by_key(&Some(id), instance).is_ok()
+        has(&self.sets[parameter], id)
     }
 
     fn held(&mut self, mixtures: Vec<InstanceId>, lab: &Elaborator<'_>) -> &BTreeSet<SpeciesId> {
@@ -151,4 +149,9 @@ impl<'a> Tuples<'a> {
         }
         &self.held.get_or_insert_default().1
     }
+}
+
+/// Whether a set of instances, which are in their order, has one.
+pub(super) fn has(set: &[Value], id: InstanceId) -> bool {
+    set.binary_search_by_key(&Some(id), Value::instance).is_ok()
 }

@@ -80,6 +80,11 @@ pub enum Value {
 }
 
 impl Value {
+    /// The instance that it is, if it is one that is known and named in full.
+    pub fn instance(&self) -> Option<InstanceId> {
+        if let Value::Instance(id) = self { Some(*id) } else { None }
+    }
+
     /// What it is, for "expected ..., found ...".
     pub fn what(&self) -> &'static str {
         match self {

@@ -1,5 +1,6 @@
 //! Calls: which skill or command a verb means, and its arguments.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use matterix_ir::plan::{Argument, Step, StepId};
@@ -14,7 +15,7 @@ use crate::declare::Type;
 use crate::eval::lab::verbs::Verb;
 use crate::eval::{Scope, Value};
 use crate::hints;
-use crate::names::{DeclId, verb_text};
+use crate::names::{DeclId, names_of, verb_text};
 use crate::near;
 use crate::syntax::{STEP_WORDS, is_step};
 
@@ -607,7 +608,7 @@ impl<'a> Planner<'a, '_> {
             Some(Value::List(all)) => all.first().cloned(),
             other => other,
         };
-        for name in crate::eval::lab::given::names_of(e) {
+        for name in names_of(e).into_iter().collect::<BTreeSet<_>>() {
             let Some(id) = self.lab.tables.names.lookup(module, name) else { continue };
             let is_of_one =
                 matches!(&self.lab.tables.names.decl(id).item.kind, ItemKind::Fn { params, .. } if params.len() == 1);

@@ -11,7 +11,7 @@ use matterix_ir::{Diagnostic, FileId, Span, codes};
 use crate::ast::{self, Item, ItemKind, Name};
 use crate::{library, near};
 
-pub(crate) use mentioned::{bare, names_in};
+pub(crate) use mentioned::{bare, names_in, names_of};
 
 /// A module: one file.
 #[derive(Clone, Debug)]

@@ -43,7 +43,8 @@ pub(super) struct Factors {
     /// The rows and columns that are eliminated first, in their order; the others follow as they are.
     first: Vec<usize>,
     triangles: Matrix,
-    /// The row of the matrix of each row of the triangles.
+    /// The column of the matrix of each column of the triangles, and the row of each row.
+    columns: Vec<usize>,
     rows: Vec<usize>,
 }
 
@@ -59,20 +60,16 @@ impl Factors {
         factors.factor().then_some(factors)
     }
 
-    /// The column of the matrix that is eliminated as the `k`th.
-    fn place(&self, k: usize) -> usize {
-        self.first.get(k).copied().unwrap_or(k)
-    }
-
     /// Factors the matrix, with the largest entry of each column as pivot; whether it has an inverse.
     pub(super) fn factor(&mut self) -> bool {
         let n = self.matrix.size;
-        self.rows.clear();
-        self.rows.extend((0..n).map(|k| self.first.get(k).copied().unwrap_or(k)));
+        self.columns.clear();
+        self.columns.extend((0..n).map(|k| self.first.get(k).copied().unwrap_or(k)));
+        self.rows.clone_from(&self.columns);
         self.triangles.clear(n);
-        for k in 0..n {
-            let from = self.matrix.row(self.rows[k]);
-            self.triangles.row_mut(k).iter_mut().zip(&self.rows).for_each(|(to, column)| *to = from[*column]);
+        for (k, row) in self.rows.iter().enumerate() {
+            let from = self.matrix.row(*row);
+            self.triangles.row_mut(k).iter_mut().zip(&self.columns).for_each(|(to, column)| *to = from[*column]);
         }
         let entries = &mut self.triangles.entries;
         for k in 0..n {
@@ -111,7 +108,7 @@ impl Factors {
         x
     }
 
-    /// The same, in memory that is there.
+    /// The same, into memory that is there.
     pub(super) fn solve_into(&self, right: &[f64], x: &mut Vec<f64>) {
         let n = self.matrix.size;
         let mut solved: Vec<f64> = self.rows.iter().map(|row| right[*row]).collect();
@@ -125,6 +122,6 @@ impl Factors {
         }
         x.clear();
         x.resize(n, 0.0);
-        solved.into_iter().enumerate().for_each(|(k, value)| x[self.place(k)] = value);
+        solved.into_iter().zip(&self.columns).for_each(|(value, column)| x[*column] = value);
     }
 }

@@ -84,10 +84,10 @@ pub fn rises(t: f64) -> [f64; Layout::TERMS] {
 /// The solution of a system for its arguments. Where half-cells leave the potential open it is rounding that leads there or astray: what is
 /// not found is sought once more with the linear system eliminated in another order.
 pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
-    [false, true].into_iter().find_map(|as_numbered| seek(system, args, as_numbered))
+    [false, true].into_iter().find_map(|as_numbered| solve_in_order(system, args, as_numbered))
 }
 
-fn seek(system: &System, args: &[f64], as_numbered: bool) -> Option<Solution> {
+fn solve_in_order(system: &System, args: &[f64], as_numbered: bool) -> Option<Solution> {
     if args.len() != system.layout().count() || args.iter().any(|v| v.is_nan()) {
         return None;
     }
@@ -163,7 +163,7 @@ fn held_at(free: &Problem<'_>, temperature: f64) -> Option<(f64, Solution)> {
     let mut args = free.args.to_vec();
     (args[layout.capacity()], args[layout.heat()]) = (f64::INFINITY, 0.0);
     args[layout.reference()] = temperature;
-    let solution = seek(free.system, &args, free.as_numbered)?;
+    let solution = solve_in_order(free.system, &args, free.as_numbered)?;
     let capacity = free.args[layout.capacity()] + solution.capacity;
     Some((solution.heat + capacity * (temperature - free.reference()), solution))
 }

@@ -68,6 +68,11 @@ impl Interpreter<'_, '_> {
         }
     }
 
+    /// The same of a wait, which fails with `timeout`. One without a limit raises nothing that a handler could take.
+    pub(super) fn unless_timeout_taken(&mut self, limited: bool, tell: impl FnOnce(&mut Self)) {
+        if limited { self.unless_taken("timeout", tell) } else { tell(self) }
+    }
+
     /// Notes that a statement came to its end.
     pub(super) fn came_to_end(&mut self, site: Span) {
         if self.caught.iter().any(|net| net.any.is_some()) {

@@ -185,14 +185,10 @@ impl<'l> Interpreter<'l, '_> {
                     && let Some(after) =
                         self.breaks_off(condition.node, lasts, longest - waited(&began, &facts), &facts)
                 {
-                    match timeout {
-                        Some(_) => {
-                            self.unless_taken("timeout", |flow| flow.never_held(condition, (lasts, after), true))
-                        }
-                        None => self.never_held(condition, (lasts, after), false),
-                    }
+                    let limited = timeout.is_some();
+                    self.unless_timeout_taken(limited, |flow| flow.never_held(condition, (lasts, after), limited));
                     // Only the way of the handler goes on.
-                    if timeout.is_some() && self.is_taken("timeout") {
+                    if limited && self.is_taken("timeout") {
                         self.pass(&AbstractValue::point(longest - waited(&began, &facts)), &mut facts);
                         self.raise_written("timeout", node.span, facts);
                         return None;
@@ -358,12 +354,8 @@ impl<'l> Interpreter<'l, '_> {
         if value.truth() == Some(false) && !parts.timed && !shared {
             let never = self.eval(condition.node, &facts).truth() == Some(false);
             if never {
-                // A wait without a limit raises nothing that a handler could take.
                 let limited = timeout.is_some();
-                match limited {
-                    true => self.unless_taken("timeout", |flow| flow.never_comes(condition, true, &before, &facts)),
-                    false => self.never_comes(condition, false, &before, &facts),
-                }
+                self.unless_timeout_taken(limited, |flow| flow.never_comes(condition, limited, &before, &facts));
                 // Only the way of the handler goes on.
                 if limited && self.is_taken("timeout") {
                     return None;

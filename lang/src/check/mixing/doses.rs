@@ -71,10 +71,14 @@ impl Walk<'_, '_> {
 
     /// Whether something flows, or may: processes whose condition is not known before the run, and events.
     pub(super) fn may_flow(&self, world: &MixtureState) -> bool {
-        let lab = self.eyes.lab;
-        let guard = |process: usize| lab.processes.get(process).and_then(|p| p.guard);
-        let may = |process: usize| guard(process).is_none_or(|g| self.eyes.truth(g, world) != Some(false));
-        !self.by_event.is_empty() || lab.streams.keys().any(|(process, ..)| may(*process))
+        let may = |process: usize| self.runs(process, world) != Some(false);
+        !self.by_event.is_empty() || self.eyes.lab.streams.keys().any(|(process, ..)| may(*process))
+    }
+
+    /// Whether a process acts, if that is known.
+    pub(super) fn runs(&self, process: usize, world: &MixtureState) -> Option<bool> {
+        let guard = self.eyes.lab.processes.get(process).and_then(|p| p.guard);
+        guard.map_or(Some(true), |g| self.eyes.truth(g, world))
     }
 
     fn even_flow(&self, lasts: Lasts, world: &MixtureState) -> Option<Dose> {
@@ -153,8 +157,7 @@ impl Walk<'_, '_> {
         let lab = self.eyes.lab;
         let (mut flowing, mut open) = (BTreeSet::new(), self.by_event.clone());
         for (stream, flows) in &lab.streams {
-            let guard = lab.processes.get(stream.0).and_then(|p| p.guard);
-            match guard.map_or(Some(true), |g| self.eyes.truth(g, world)) {
+            match self.runs(stream.0, world) {
                 Some(false) => {}
                 Some(true) if self.eyes.value(*flows, world) == 0.0 => {}
                 Some(true) => {

@@ -85,7 +85,7 @@ impl Walk<'_, '_> {
             for (mixture, species, span) in due {
                 self.bring(mixture, species, span, world);
             }
-            self.streams(&None, world);
+            self.streams(None, world);
         }
     }
 

@@ -48,7 +48,7 @@ impl Hazards {
         Hazards { all: all.into(), by_state, present, standing, since, told, settling: Settling::default() }
     }
 
-    /// Takes note of the events that set what hazards of the user's own ask for.
+    /// Takes note of the events that set what hazards ask for.
     pub(super) fn settle(&mut self, eyes: &NodeEvaluator<'_, '_>, events: &[Event], library: &BTreeSet<FileId>) {
         let (settling, reads) = Settling::new(eyes, &self.all, events, library);
         self.settling = settling;
@@ -192,15 +192,15 @@ impl Walk<'_, '_> {
         world.share = share;
         for i in found {
             let hazard = &self.hazards.all[i];
+            if !matches!(hazard.watched, Watched::Transfer(.., Some(_))) {
+                self.used_here(i, world);
+                continue;
+            }
             let world = &*self.seen_by(i, world);
-            match hazard.watched {
-                Watched::Transfer(.., Some(_)) if self.eyes.nominal_truth(hazard.when, world) == Some(true) => {
-                    let words = self.worded(hazard, world).unwrap_or_default();
-                    let place = self.place();
-                    self.hazards.since.insert(i, (place, words));
-                }
-                Watched::Transfer(.., Some(_)) => {}
-                _ => self.used_here(i, world),
+            if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
+                let words = self.worded(hazard, world).unwrap_or_default();
+                let place = self.place();
+                self.hazards.since.insert(i, (place, words));
             }
         }
         world.share = f64::NAN;

@@ -341,7 +341,7 @@ impl Walk<'_, '_> {
                 dose.iter().for_each(|dose| self.pours(dose, &mut world));
                 // What begins may be over when the operation is.
                 if !o.at_start.is_empty() && !o.at_end.is_empty() {
-                    self.streams(&dose, &mut world);
+                    self.streams(dose.as_ref(), &mut world);
                 }
                 for action in &o.at_end {
                     self.action(action, &mut world);
@@ -349,7 +349,7 @@ impl Walk<'_, '_> {
                 // What is over at once leaves the amounts as they are, whatever begins to flow.
                 let at_once = o.takes.is_none() && o.until.is_none() && self.by_event.is_empty();
                 let at_once = at_once.then(|| world.states.clone());
-                self.streams(&dose, &mut world);
+                self.streams(dose.as_ref(), &mut world);
                 world.states = at_once.unwrap_or(world.states);
                 dose.iter().for_each(|dose| self.given_off(dose, &mut world));
                 self.fed(&mut world);
@@ -515,18 +515,17 @@ impl Walk<'_, '_> {
     }
 
     /// Transfers that processes and events make from now on. How much of its source each of them takes is not known, but for those of a dose.
-    fn streams(&mut self, dose: &Option<Dose>, world: &mut MixtureState) {
+    fn streams(&mut self, dose: Option<&Dose>, world: &mut MixtureState) {
         let lab = self.eyes.lab;
         let mut active = self.by_event.clone();
         for (process, from, to) in lab.streams.keys() {
-            let guard = lab.processes.get(*process).and_then(|p| p.guard);
-            if guard.is_none_or(|g| self.eyes.truth(g, world) != Some(false)) {
+            if self.runs(*process, world) != Some(false) {
                 active.insert((*from, *to));
                 self.flows((*process, *from, *to), world);
             }
         }
         for (from, to) in &active {
-            if !dose.as_ref().is_some_and(|dose| dose.takes(*from, *to)) {
+            if !dose.is_some_and(|dose| dose.takes(*from, *to)) {
                 self.transfers(*from, *to, f64::NAN, world);
             }
         }
@@ -556,7 +555,7 @@ impl Walk<'_, '_> {
         let time = time.filter(|_| self.beside == 0).map(|time| self.eyes.value(time, world));
         let dose = time.and_then(|time| self.waited(time, world));
         dose.iter().for_each(|dose| self.pours(dose, world));
-        self.streams(&dose, world);
+        self.streams(dose.as_ref(), world);
         dose.iter().for_each(|dose| self.given_off(dose, world));
         self.fed(world);
         self.endanger(world);

@@ -400,7 +400,7 @@ impl<'s, 'w, 'v, 'a> Search<'s, 'w, 'v, 'a> {
                 let actions = if begins { &operation.at_start } else { &operation.at_end };
                 actions.iter().for_each(|action| self.walk.action(action, &mut world));
                 if !actions.is_empty() {
-                    self.walk.streams(&None, &mut world);
+                    self.walk.streams(None, &mut world);
                     let place = self.walk.place();
                     if let Some(found) = &mut self.walk.orders {
                         *found.done.entry(place).or_default() += 1;

@@ -1,5 +1,5 @@
 //! What a moment leaves once all that happens at once has happened: salts have split in water. The contents of the walk keep what was put
-//! in, which reactions and findings go by; a hazard of the user's own asks for what is there.
+//! in, which reactions and findings go by; a hazard asks for what is there.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};

@@ -133,7 +133,7 @@ impl<'a> Elaborator<'a> {
             None => Candidates::new(),
         };
         let name = crate::names::item_name(self.tables.names.decl(id).item).map(|(name, _)| name)?;
-        let others: Vec<InstanceId> = scope.vars.iter().filter_map(|(_, v)| instance(v)).collect();
+        let others: Vec<InstanceId> = scope.vars.iter().filter_map(|(_, v)| v.instance()).collect();
         let ends = self.pairs.iter().filter(|p| p.name == name).flat_map(|p| [(p.a, p.b), (p.b, p.a)]);
         found.extend(ends.filter(|(other, _)| others.is_empty() || others.contains(other)).map(|(_, end)| end));
         Some(found)
@@ -242,10 +242,6 @@ impl<'a> Elaborator<'a> {
         let [m] = *members else { return Side::FreeParameters };
         self.points_at(id, m).map_or(Side::FreeParameters, Side::Targets)
     }
-}
-
-fn instance(value: &Value) -> Option<InstanceId> {
-    if let Value::Instance(i) = value { Some(*i) } else { None }
 }
 
 #[cfg(test)]

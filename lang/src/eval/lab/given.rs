@@ -11,7 +11,7 @@ use crate::declare::fields::word;
 use crate::declare::tables::{MemberRef, Tables};
 use crate::eval::lab::written::GEOMETRY;
 use crate::eval::{Num, Scope, Value};
-use crate::names::DeclId;
+use crate::names::{DeclId, names_of};
 
 /// The option of a derived member that says what to give in its place.
 pub const INSTEAD: &str = "instead";
@@ -28,41 +28,6 @@ const DEEPEST: usize = 4;
 /// Whether a member takes what stands after `holding ... at`.
 fn takes_start(m: &MemberRef<'_>) -> bool {
     matches!(&m.member.kind, MemberKind::Value { role: Role::Param, options, .. } if word(options, GIVEN_BY) == Some("at"))
-}
-
-/// The words of an expression that may be names, each once.
-pub fn names_of(e: &Expr) -> std::collections::BTreeSet<&str> {
-    let mut out = Vec::new();
-    names_in(e, &mut out);
-    out.into_iter().collect()
-}
-
-/// The words of an expression that may be names of members.
-fn names_in<'e>(e: &'e Expr, out: &mut Vec<&'e str>) {
-    match &*e.kind {
-        ExprKind::Name(n) => out.push(&n.text),
-        ExprKind::Member(a, _) | ExprKind::IndexRange(a, ..) => names_in(a, out),
-        // A species may be given as a member: `amount[solute]`.
-        ExprKind::IndexWord(a, word) => {
-            names_in(a, out);
-            out.push(&word.text);
-        }
-        ExprKind::Prime(a) | ExprKind::Unary(_, a) | ExprKind::Of(a, _) | ExprKind::As(a, _) => names_in(a, out),
-        ExprKind::Index(a, b) | ExprKind::Binary(_, a, b) | ExprKind::Range(a, b) => {
-            names_in(a, out);
-            names_in(b, out);
-        }
-        ExprKind::Call(callee, args) => {
-            names_in(callee, out);
-            args.iter().for_each(|a| names_in(&a.value, out));
-        }
-        ExprKind::Fold { set, body, .. } => {
-            names_in(set, out);
-            names_in(body, out);
-        }
-        ExprKind::Tuple(items, _) | ExprKind::List(items) => items.iter().for_each(|i| names_in(i, out)),
-        ExprKind::Error | ExprKind::Number(_) | ExprKind::Quantity(..) | ExprKind::Text(_) | ExprKind::Scoped(_) => {}
-    }
 }
 
 /// Why a member cannot be given; nothing for one that can.
@@ -159,10 +124,8 @@ impl<'a> Elaborator<'a> {
     /// The members that can be given from which a definition follows.
     fn sources(&self, kind: DeclId, value: Option<&'a Expr>, depth: usize, out: &mut Vec<&'a str>) {
         let Some(e) = value.filter(|_| depth > 0) else { return };
-        let mut names = Vec::new();
-        names_in(e, &mut names);
         let tables: &'a Tables<'a> = self.tables;
-        for name in names {
+        for name in names_of(e) {
             let [m] = tables.members(kind, name) else { continue };
             match &m.member.kind {
                 MemberKind::Value { role: Role::Derived, value, .. } => {
@@ -239,9 +202,8 @@ impl<'a> Elaborator<'a> {
         let rival = members.iter().find_map(|o| match &o.member.kind {
             MemberKind::Value { name: other, value, .. } => {
                 let given = self.instances[id.0 as usize].setting(&other.text)?;
-                let mut names = Vec::new();
-                value.iter().for_each(|e| names_in(e, &mut names));
-                (other.text == name.text || names.contains(&name.text.as_str())).then_some(given.field)
+                let follows = value.as_ref().is_some_and(|e| names_of(e).contains(&name.text.as_str()));
+                (other.text == name.text || follows).then_some(given.field)
             }
             _ => None,
         });
