@@ -107,3 +107,32 @@ workflow w(t: Temperature = 25 degC) in bench {{ wait 1 s; expect cup.contents.a
         assert!(code == 1 && said.contains(wanted), "{name}: {said}");
     }
 }
+
+#[test]
+fn an_ion_stands_wherever_a_value_may() {
+    let text = "mtx 1
+use std::equilibria
+use std::glassware::Beaker250mL
+fn total(m: Mixture) -> Amount = sum(s in [Cl-, Na+]: m.amount[s])
+fn same_total(m: Mixture) -> Amount = sum(s in m.species: choose(s == Cl- or s == Na+, m.amount[s], 0 mol))
+fn is_counter_ion(s: Species) -> Bool = s == Cl-
+fn heavier() -> Bool = SO4^2-.molar_mass > HSO4-.molar_mass - 2 * H+.molar_mass
+lab bench { ambient: 25 degC, pot = Beaker250mL at (0, 0, 0) mm holding 100 g of water + 20 mmol of NaCl }
+workflow w in bench {
+    for s in [acetate, H+, OH-] { expect pot.contents.amount[s] < 1 mmol }
+    for s in [
+        Cl-,
+        Na+
+    ] {
+        expect pot.contents.amount[s] in 19.9 mmol .. 20.1 mmol
+    }
+    expect total(pot.contents) in 39.9 mmol .. 40.1 mmol
+    expect same_total(pot.contents) == total(pot.contents)
+    expect is_counter_ion(Cl-) and not is_counter_ion(Na+) and heavier()
+    let n = 3
+    let m = n- 1
+    expect m == 2 and n -1 == 2 and (n-1) == 2 and n^2-1 == 8
+}
+";
+    holds("ion", text);
+}

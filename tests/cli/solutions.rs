@@ -292,6 +292,75 @@ fn pouring_water_into_strong_acid_is_told_from_pouring_acid_into_water() {
     assert!(!found.contains("water-into-acid") && !found.contains("hot-mixing"), "{found}");
 }
 
+#[test]
+fn the_heat_of_neutralising_is_foretold_as_the_run_has_it() {
+    let stocks = "solution lye { NaOH: 10 mol/kg, water: rest }
+solution acid { HCl: 5 mol/kg, water: rest }
+solution ammonia_water { NH3: 10 mol/kg, water: rest }
+";
+    let cases = [
+        ("50 g", "lye", "100 g of water + 0.5 mol of acetic_acid"),
+        ("60 g", "lye", "100 g of water + 0.2 mol of H3PO4"),
+        ("60 g", "lye", "100 g of water + 0.2 mol of citric_acid"),
+        ("50 g", "lye", "100 g of acid"),
+        ("50 g", "ammonia_water", "100 g of acid"),
+        ("20 g", "NaOH", "100 g of water"),
+        ("20 g", "NaOH", "100 g of acid"),
+    ];
+    let (mut vessels, mut steps) = (Vec::new(), String::new());
+    for (i, (mass, what, into)) in cases.iter().enumerate() {
+        vessels.extend([format!("{mass} of {what}"), (*into).to_owned()]);
+        let (from, to) = (2 * i, 2 * i + 1);
+        let _ = writeln!(
+            steps,
+            "    weigh_out {mass} from c{from} into c{to}\n    wait 1 ms\n    expect c{to}.contents.temperature > 0 degC"
+        );
+    }
+    let ran = run("foretold", &lab(&format!("use std::equilibria\n{stocks}"), &vessels, &steps));
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let said = flat(&ran.err);
+    for (i, found) in measured(&ran).into_iter().enumerate() {
+        let (_, after) = said.split_once(&format!("`c{}` would warm by about ", 2 * i + 1)).expect("it is foretold");
+        let (foretold, _) = after.split_once(" K").expect("it is in kelvins");
+        let foretold: f64 = foretold.parse().expect("it is a number");
+        assert!((found - 25.0 - foretold).abs() <= 1.5, "{:?}: {foretold} K foretold, {found} degC", cases[i]);
+    }
+}
+
+#[test]
+fn findings_go_by_what_equilibria_make_of_it() {
+    let found = |name: &str, head: &str, into: &str, steps: &str| {
+        let dir = folder(name);
+        let vessels = ["20 g of NaOH".to_owned(), into.to_owned()];
+        write(&dir, "lab.mtx", lab(&format!("use std::equilibria\n{head}"), &vessels, steps));
+        let ended = matterixc(&["check", dir.join("lab.mtx").to_str().expect("the path is text")]);
+        flat(&format!("{}{}", ended.out, ended.err))
+    };
+    let reads = "    weigh_out 20 g from c0 into c1\n    expect acidity(c1.contents) > 4\n";
+    let neutral = found("acetate", "", "100 g of water + 0.5 mol of acetic_acid", reads);
+    assert!(!neutral.contains("another liquid"), "acetate is no liquid: {neutral}");
+    let acid = found("vinegar", "", "60 g of water + 0.5 mol of acetic_acid", "    expect acidity(c1.contents) > 1\n");
+    assert!(acid.contains("33 % of its mass is another liquid"), "{acid}");
+    let own = "species my_chloride { formula: \"AgCl\", density: 5.56 g/mL, heat_capacity: 50.8 J/(mol*K) }
+equilibrium comes_out: my_chloride <-> Ag+ + Cl- { ksp: 1.77e-10, enthalpy: 65.5 kJ/mol }
+";
+    let silver = found("own_silver", own, "100 g of water + 1 mmol of AgNO3 + 1 mmol of NaCl", "    wait 1 s\n");
+    assert!(!silver.contains("holds more AgCl than dissolves"), "an equilibrium has it: {silver}");
+}
+
+#[test]
+fn without_water_there_is_no_ph() {
+    for uses in ["", "use std::equilibria\n"] {
+        let dir = folder("no_ph");
+        let vessels = ["10 g of ethanol".to_owned(), "10 g of water".to_owned()];
+        let look = "    expect acidity(c1.contents) in 6.9 .. 7.1\n    expect acidity(c0.contents) in 6.9 .. 7.1\n";
+        write(&dir, "lab.mtx", lab(uses, &vessels, look));
+        let ended = matterixc(&["run", dir.join("lab.mtx").to_str().expect("the path is text"), "--no-cache"]);
+        let said = flat(&format!("{}{}", ended.out, ended.err));
+        assert!(ended.code == 1 && said.contains("logarithm of 0"), "{uses}: {said}");
+    }
+}
+
 /// A cup of water into which portions of a salt go, with what is expected after each.
 fn portions(salt: &str, water: &str, steps: &[(&str, &str)]) -> String {
     let steps: String = steps

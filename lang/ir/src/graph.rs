@@ -506,6 +506,30 @@ impl Graph {
         }
     }
 
+    /// A value as it would be if some states had other values, by their indices; the rest stays as it is.
+    pub fn with_states(&mut self, node: NodeId, states: &HashMap<u32, NodeId>) -> NodeId {
+        let order = self.schedule([node]);
+        let mut now: HashMap<NodeId, NodeId> = HashMap::with_capacity(order.len());
+        for n in order {
+            let at = |operand: NodeId| now.get(&operand).copied().unwrap_or(operand);
+            let made = match self.op(n) {
+                Op::State(s) => states.get(&s).copied().unwrap_or(n),
+                Op::Unary(op, a) => self.unary(op, at(a)),
+                Op::Binary(op, a, b) => self.binary(op, at(a), at(b)),
+                Op::Select(c, a, b) => self.select(at(c), at(a), at(b)),
+                Op::List(a, b) => self.add(Op::List(at(a), at(b))),
+                Op::Solved(call, _) => {
+                    let Call { system, part, args } = self.call(call).clone();
+                    let args = args.iter().map(|arg| at(*arg)).collect();
+                    self.solved(&system, part, &args)
+                }
+                Op::Const(_) | Op::Time | Op::Param(_) | Op::Local(_) | Op::Reading(_) => n,
+            };
+            now.insert(n, made);
+        }
+        now.get(&node).copied().unwrap_or(node)
+    }
+
     /// Evaluates every operation in order into `out`, which is resized to fit. The reference semantics of the graph.
     pub fn eval_all(&self, env: Env<'_>, out: &mut Vec<f64>) {
         out.clear();
@@ -694,4 +718,31 @@ fn written(op: BinaryOp, a: f64, b: f64) -> f64 {
 
 fn truth(b: bool) -> f64 {
     f64::from(u8::from(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BinaryOp, Env, Graph, HashMap, Op, UnaryOp};
+
+    #[test]
+    fn a_value_with_other_states_is_that_at_their_values() {
+        let mut graph = Graph::default();
+        let [a, b, c] = [0, 1, 2].map(|s| graph.add(Op::State(s)));
+        let (square, sine) = (graph.binary(BinaryOp::Mul, a, a), graph.unary(UnaryOp::Sin, b));
+        let sum = graph.binary(BinaryOp::Add, square, sine);
+        let less = graph.binary(BinaryOp::Lt, a, b);
+        let value = graph.select(less, sum, square);
+        let share = graph.number(0.5);
+        let comes = graph.binary(BinaryOp::Mul, share, c);
+        let states = HashMap::from([(0, graph.binary(BinaryOp::Add, a, comes)), (1, c)]);
+        let then = graph.with_states(value, &states);
+        let at = |graph: &Graph, node, states: &[f64]| {
+            graph.eval(node, Env { time: 0.0, states, params: &[], locals: &[], readings: &[] })
+        };
+        for [x, y, z] in [[1.0, 2.0, 3.0], [2.0, 0.5, -1.0], [0.0, 0.0, 4.0]] {
+            let (found, wanted) = (at(&graph, then, &[x, y, z]), at(&graph, value, &[x + 0.5 * z, z, z]));
+            assert!((found - wanted).abs() < 1e-15, "{found} {wanted}");
+        }
+        assert_eq!(graph.with_states(value, &HashMap::new()), value);
+    }
 }

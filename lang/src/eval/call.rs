@@ -6,6 +6,7 @@ use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 use super::{Num, Scope, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Name, Param};
 use crate::declare::{ReactionId, SpeciesId, Type};
+use crate::eval::external::AS_PUT;
 use crate::eval::lab::Mode;
 use crate::eval::lab::{Elaborator, Pair};
 use crate::hints;
@@ -83,7 +84,10 @@ impl<'a> Elaborator<'a> {
             ItemKind::Fn { params, name, .. } | ItemKind::Relation { params, name, .. } => (params, &name.text),
             _ => return Value::Error,
         };
-        let Some(values) = self.arguments(params, decl.module, args, span, name, scope) else { return Value::Error };
+        let external = matches!(decl.item.kind, ItemKind::Fn { external: true, .. });
+        let mode = Mode { pooled: self.mode().pooled || (external && name == AS_PUT), ..self.mode() };
+        let values = self.in_mode(mode, |lab| lab.arguments(params, decl.module, args, span, name, scope));
+        let Some(values) = values else { return Value::Error };
         if let Some(v) = self.pair_setting(name, &values) {
             return v;
         }

@@ -100,6 +100,12 @@ enum Bound {
     Interacts,
     /// The temperature at equilibrium.
     Settled,
+    /// A value by what was put into mixtures, whatever equilibria make of it.
+    AsPut,
+    /// The heat of coming to equilibrium from what is there.
+    HeatOfSettling,
+    /// What a value would be with a share of one mixture added to another.
+    Adding,
     /// The ionic strength that equilibria leave.
     IonicStrength,
     /// Whether equilibria have constants at a temperature.
@@ -126,6 +132,9 @@ enum Bound {
     OverTime(Keep),
 }
 
+/// The function whose argument is taken by what was put in.
+pub const AS_PUT: &str = "as_put";
+
 const TABLE: &[(&str, Bound)] = &[
     ("activity", Bound::Activity),
     ("balanced", Bound::Balanced),
@@ -137,6 +146,9 @@ const TABLE: &[(&str, Bound)] = &[
     ("alongside", Bound::Opposed(false)),
     ("interacts", Bound::Interacts),
     ("settled_temperature", Bound::Settled),
+    (AS_PUT, Bound::AsPut),
+    ("heat_of_settling", Bound::HeatOfSettling),
+    ("after_adding", Bound::Adding),
     ("settled_strength", Bound::IonicStrength),
     ("equilibria_hold", Bound::EquilibriaHold),
     ("constants_hold", Bound::ConstantsHold),
@@ -362,6 +374,15 @@ impl Elaborator<'_> {
                 let node = self.settled(*m, |_| Some(Part::Temperature)).unwrap_or(otherwise.node);
                 Value::Num(Num { node, literal: false, ..otherwise.clone() })
             }
+            (Bound::AsPut, [Value::Num(n)]) => Value::Num(n.clone()),
+            (Bound::Adding, [Value::Num(n), Value::Num(share), Value::Instance(from), Value::Instance(to)]) => {
+                let node = self.after_adding(n.node, share.node, (*from, *to));
+                Value::Num(Num { node, literal: false, ..n.clone() })
+            }
+            (Bound::Adding, [Value::Concentration(..), ..]) => {
+                self.kindless(at);
+                Value::Error
+            }
             (Bound::IonicStrength, [Value::Instance(m), Value::Num(otherwise)]) => {
                 let node = self.settled(*m, |_| Some(Part::Strength)).unwrap_or(otherwise.node);
                 Value::Num(Num { node, literal: false, ..otherwise.clone() })
@@ -372,8 +393,13 @@ impl Elaborator<'_> {
             (Bound::ConstantsHold, [Value::Instance(m), Value::Species(s), Value::Num(t)]) => {
                 Value::Bool(self.equilibria_hold(*m, Some(*s), t.node))
             }
+            (Bound::HeatOfSettling, [Value::Instance(m), Value::Num(t)]) => {
+                let node = self.heat_of_settling(*m, t.node, self.mode().at_start);
+                let node = node.unwrap_or_else(|| self.graph.number(0.0));
+                self.num(node, self.tables.units.named("Energy"))
+            }
             (Bound::HeatAtStart, [Value::Instance(m), Value::Num(t)]) => {
-                let node = self.heat_at_start(*m, t.node);
+                let node = self.heat_of_settling(*m, t.node, true);
                 let node = node.unwrap_or_else(|| self.graph.number(0.0));
                 self.num(node, self.tables.units.named("Energy"))
             }
