@@ -59,7 +59,8 @@ impl<'a, R: Iterator<Item = &'a f64>> FromIterator<R> for Sparse {
 /// How members follow from masters.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Basis {
-    /// The masters, by member.
+    /// The masters, by member: in the order in which the linear system is eliminated. That which most members are made of comes last, so
+    /// that most of the system stays empty.
     pub(super) masters: Vec<usize>,
     /// By member: how much of each master it is made of.
     pub(super) of: Vec<Vec<f64>>,
@@ -89,9 +90,8 @@ pub(super) struct Basis {
     pub(super) of_held: Vec<Vec<f64>>,
     /// By master: whether no member takes any of it away, so that its total is at least 0.
     pub(super) is_matter: Vec<bool>,
-    /// The masters in the order in which the linear system is eliminated: that which most members are made of comes last, so that most
-    /// of the system stays empty.
-    pub(super) elimination: Vec<usize>,
+    /// The masters in the order of their members, another one to eliminate in.
+    pub(super) numbered: Vec<usize>,
     /// Whether a member is made of many of one master.
     pub(super) is_steep: bool,
     /// Equations that follow from others.
@@ -164,12 +164,16 @@ impl Basis {
 
     /// With what follows from the rest.
     fn complete(mut self) -> Basis {
+        let makes = |c: usize| self.of.iter().filter(|of| of[c] != 0.0).count();
+        let mut order: Vec<usize> = (0..self.masters.len()).collect();
+        order.sort_by_key(|c| (makes(*c), self.masters[*c]));
+        self.masters = order.iter().map(|c| self.masters[*c]).collect();
+        self.of.iter_mut().for_each(|of| *of = order.iter().map(|c| of[*c]).collect());
+        self.numbered = (0..self.masters.len()).collect();
+        self.numbered.sort_by_key(|c| self.masters[*c]);
         self.masters_of = self.of.iter().map(|of| of.iter()).collect();
         self.parts = self.of.iter().zip(&self.solvent).map(|(of, solvent)| of.iter().chain([solvent])).collect();
         self.is_steep = self.masters_of.rows().flatten().any(|(_, part)| part.abs() > STEEP);
-        let makes = |c: &usize| self.of.iter().filter(|of| of[*c] != 0.0).count();
-        self.elimination = (0..self.masters.len()).collect();
-        self.elimination.sort_by_key(makes);
         self.is_matter = (0..self.masters.len()).map(|c| self.of.iter().all(|of| of[c] >= 0.0)).collect();
         self
     }

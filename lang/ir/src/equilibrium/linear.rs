@@ -38,11 +38,12 @@ impl Matrix {
 /// A matrix as the product of two triangles.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Factors {
-    /// What is to be factored.
+    /// What is to be factored; the triangles, once it is.
     pub(super) matrix: Matrix,
     /// The rows and columns that are eliminated first, in their order; the others follow as they are.
     first: Vec<usize>,
-    triangles: Matrix,
+    /// Room for the matrix in that order.
+    ordered: Matrix,
     /// The column of the matrix of each column of the triangles, and the row of each row.
     columns: Vec<usize>,
     rows: Vec<usize>,
@@ -60,18 +61,16 @@ impl Factors {
         factors.factor().then_some(factors)
     }
 
-    /// Factors the matrix, with the largest entry of each column as pivot; whether it has an inverse.
+    /// Factors the matrix in its place, with the largest entry of each column as pivot; whether it has an inverse.
     pub(super) fn factor(&mut self) -> bool {
         let n = self.matrix.size;
         self.columns.clear();
         self.columns.extend((0..n).map(|k| self.first.get(k).copied().unwrap_or(k)));
         self.rows.clone_from(&self.columns);
-        self.triangles.clear(n);
-        for (k, row) in self.rows.iter().enumerate() {
-            let from = self.matrix.row(*row);
-            self.triangles.row_mut(k).iter_mut().zip(&self.columns).for_each(|(to, column)| *to = from[*column]);
+        if !self.first.is_empty() {
+            self.bring_in_order();
         }
-        let entries = &mut self.triangles.entries;
+        let entries = &mut self.matrix.entries;
         for k in 0..n {
             let (mut pivot, mut largest) = (k, entries[k * n + k].abs());
             for row in k + 1..n {
@@ -83,12 +82,12 @@ impl Factors {
             if largest == 0.0 || !largest.is_finite() {
                 return false;
             }
+            let (above, below) = entries.split_at_mut((k + 1) * n);
+            let from = &mut above[k * n..];
             if pivot != k {
                 self.rows.swap(pivot, k);
-                (0..n).for_each(|j| entries.swap(pivot * n + j, k * n + j));
+                from.swap_with_slice(&mut below[(pivot - k - 1) * n..][..n]);
             }
-            let (above, below) = entries.split_at_mut((k + 1) * n);
-            let from = &above[k * n..];
             let by = 1.0 / from[k];
             for to in below.chunks_exact_mut(n) {
                 if to[k] != 0.0 {
@@ -99,6 +98,16 @@ impl Factors {
             }
         }
         true
+    }
+
+    /// Brings rows and columns into the order in which they are eliminated.
+    fn bring_in_order(&mut self) {
+        self.ordered.clear(self.matrix.size);
+        for (k, row) in self.rows.iter().enumerate() {
+            let from = self.matrix.row(*row);
+            self.ordered.row_mut(k).iter_mut().zip(&self.columns).for_each(|(to, column)| *to = from[*column]);
+        }
+        std::mem::swap(&mut self.matrix, &mut self.ordered);
     }
 
     /// What the matrix takes to `right`.
@@ -114,10 +123,10 @@ impl Factors {
         let mut solved: Vec<f64> = self.rows.iter().map(|row| right[*row]).collect();
         let dot = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
         for k in 0..n {
-            solved[k] -= dot(&self.triangles.row(k)[..k], &solved[..k]);
+            solved[k] -= dot(&self.matrix.row(k)[..k], &solved[..k]);
         }
         for k in (0..n).rev() {
-            let row = self.triangles.row(k);
+            let row = self.matrix.row(k);
             solved[k] = (solved[k] - dot(&row[k + 1..], &solved[k + 1..])) / row[k];
         }
         x.clear();

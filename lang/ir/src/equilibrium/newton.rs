@@ -40,13 +40,6 @@ const LONGEST: f64 = 8.0;
 /// How far the temperature goes in one step at most, K.
 const WARMEST_STEP: f64 = 25.0;
 
-/// Where the unknowns are, with what follows.
-struct Best {
-    off: f64,
-    x: Vec<f64>,
-    state: State,
-}
-
 impl Problem<'_> {
     /// Newton's method; the unknowns and what follows from them. Far from the solution activity coefficients stay as they are while the
     /// rest moves, and then follow: what they would be along the way is of no use.
@@ -70,7 +63,7 @@ impl Problem<'_> {
     /// Newton's method from a point that is not far off.
     fn refine(&self, mut x: Vec<f64>, totals: &Totals, mut state: State) -> Option<(Vec<f64>, State)> {
         let places = self.places();
-        let mut best = Best { off: f64::INFINITY, x: Vec::new(), state: State::default() };
+        let (mut least, mut best) = (f64::INFINITY, Vec::new());
         let mut idle = 0;
         let mut factors = self.linear();
         let (mut right, mut step) = (Vec::new(), Vec::new());
@@ -85,7 +78,7 @@ impl Problem<'_> {
                 (true, true) => places.temperature(),
                 (true, false) => places.count(),
             };
-            let is_last = off <= CLOSE || off <= ROUNDED && best.off <= SQUARED;
+            let is_last = off <= CLOSE || off <= ROUNDED && least <= SQUARED;
             if !is_last {
                 right.clear();
                 right.extend(state.residuals[..free].iter().map(|r| -r));
@@ -97,13 +90,12 @@ impl Problem<'_> {
             }
             let follows = (!is_near && !is_last && largest(&right) < 1.0).then(|| self.surroundings(&state));
             idle += 1;
-            if off < best.off {
+            if off < least {
                 idle = 0;
-                best.off = off;
-                best.x.clone_from(&x);
-                std::mem::swap(&mut best.state, &mut state);
+                least = off;
+                best.clone_from(&x);
             }
-            if is_last || (idle > 1 && best.off <= MET) {
+            if is_last || (idle > 1 && least <= MET) {
                 break;
             }
             self.step(&mut x, &step, LONGEST / (1.0 + count as f64 / 12.0));
@@ -120,7 +112,14 @@ impl Problem<'_> {
             }
             self.evaluate(&x, totals, &mut state);
         }
-        (best.off <= MET).then_some((best.x, best.state))
+        if least > MET {
+            return None;
+        }
+        // The last step may have led away.
+        if x != best {
+            self.evaluate(&best, totals, &mut state);
+        }
+        Some((best, state))
     }
 
     /// Brings each total near what it should be, one at a time: its master grows by the ratio, to the power that makes the least of its

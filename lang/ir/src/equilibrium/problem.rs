@@ -85,7 +85,7 @@ pub(super) struct Problem<'a> {
     pub(super) basis: Arc<Basis>,
     /// The logarithm of the activity of a formal member that is held.
     pub(super) limit: f64,
-    /// Whether the linear system is eliminated in the order of its masters, and not in the one that leaves most of it empty.
+    /// Whether the linear system is eliminated in the order of members, and not in that of masters.
     pub(super) as_numbered: bool,
 }
 
@@ -97,7 +97,7 @@ impl<'a> Problem<'a> {
 
     /// A linear system that is still to be filled in.
     pub(super) fn linear(&self) -> Factors {
-        Factors::in_order(if self.as_numbered { &[] } else { &self.basis.elimination })
+        Factors::in_order(if self.as_numbered { &self.basis.numbered } else { &[] })
     }
 
     pub(super) fn places(&self) -> Places {

@@ -1,6 +1,6 @@
 //! What follows from the unknowns: constants, amounts, and how far each condition is from being met.
 
-use super::activity::{Around, Coefficient};
+use super::activity::{Around, Coefficient, Coefficients};
 use super::linear::Matrix;
 use super::pitzer::{Effects, Turn, Virial};
 use super::problem::{Problem, Totals};
@@ -21,7 +21,11 @@ pub(super) struct State {
     /// By member: enthalpy of its formation, J/mol, and the heat capacity that it takes, J/(mol*K).
     pub(super) enthalpies: Vec<f64>,
     pub(super) capacities: Vec<f64>,
-    /// By member.
+    /// The laws that coefficients follow, each with a charge, and by solute which of them: most members share a few.
+    laws: Vec<(Coefficients, f64)>,
+    law_of: Vec<usize>,
+    /// By law, and by member.
+    by_law: Vec<Coefficient>,
     pub(super) coefficients: Vec<Coefficient>,
     /// Numbers of interactions, and how much they grow with temperature.
     pub(super) numbers: Vec<f64>,
@@ -67,15 +71,16 @@ impl Problem<'_> {
         state.amounts.clear();
         state.amounts.resize(count, 0.0);
         let virial = self.system.virial.as_deref();
-        if let Some(virial) = virial {
-            self.interact(virial, &around, x, state);
+        match virial {
+            Some(virial) => self.interact(virial, &around, x, state),
+            None => self.by_laws(&around, state),
         }
         let (mut charges, mut dissolved) = (0.0, 0.0);
-        for &i in &basis.solutes {
+        for (place, &i) in basis.solutes.iter().enumerate() {
             let charge = basis.charges[i];
             let coefficient = match virial {
                 Some(virial) => virial.place(i).map_or_else(Coefficient::default, |k| state.interacting(k)),
-                None => self.coefficients(i).coefficient(&around, charge),
+                None => state.by_law[state.law_of[place]],
             };
             let activity = self.activity(i, state, x);
             if let Some(mass) = self.liquid(i) {
@@ -103,6 +108,22 @@ impl Problem<'_> {
             state.residuals.push((x[place] - per_mass) / (per_mass + NO_IONS));
         }
         state.residuals.push(self.energy_residual(state));
+    }
+
+    /// What the laws make of coefficients at an ionic strength.
+    fn by_laws(&self, around: &Around, state: &mut State) {
+        let State { laws, law_of, by_law, .. } = state;
+        if laws.is_empty() {
+            for &i in &self.basis.solutes {
+                let law = (self.coefficients(i), self.basis.charges[i]);
+                law_of.push(laws.iter().position(|known| *known == law).unwrap_or(laws.len()));
+                if law_of.last() == Some(&laws.len()) {
+                    laws.push(law);
+                }
+            }
+        }
+        by_law.clear();
+        by_law.extend(laws.iter().map(|(law, charge)| law.coefficient(around, *charge)));
     }
 
     /// What interactions make of coefficients.
@@ -201,22 +222,26 @@ impl Problem<'_> {
     pub(super) fn jacobian(&self, state: &State, free: usize, matrix: &mut Matrix) {
         let (basis, places) = (&*self.basis, self.places());
         matrix.clear(free);
+        // How an amount moves with what follows the masters; those that are not free are cut off.
+        let mut tail = vec![0.0; free - basis.masters.len()];
         for &i in &basis.solutes {
             let (amount, parts) = (state.amounts[i], basis.masters_of.row(i));
-            let (by, by_placed) = (self.amount_by(i, state), self.by_placed(i, state));
-            let add = |row: &mut [f64], share: f64| {
+            let by = self.amount_by(i, state);
+            tail.iter_mut().zip(&by[..3]).for_each(|(to, by)| *to = *by);
+            if places.strength() < free {
+                if self.system.virial.is_some() {
+                    let (by_placed, at) = (self.by_placed(i, state), places.placed().start - basis.masters.len());
+                    tail[at..].iter_mut().zip(places.placed()).enumerate().for_each(|(j, (to, _))| *to = by_placed.of(j));
+                }
+                if places.temperature() < free {
+                    tail[places.temperature() - basis.masters.len()] = by[3];
+                }
+            }
+            self.each_row(i, state, free, |row, share| {
+                let (row, share) = (matrix.row_mut(row), share * amount);
                 parts.iter().for_each(|(column, of)| row[*column] += share * of);
-                // Those that are not free are cut off.
-                row[basis.masters.len()..].iter_mut().zip(&by[..3]).for_each(|(to, by)| *to += share * by);
-                if places.strength() < row.len() {
-                    let placed = row[places.placed()].iter_mut().enumerate();
-                    placed.for_each(|(j, to)| *to += share * by_placed.of(j));
-                }
-                if let Some(to) = row.get_mut(places.temperature()) {
-                    *to += share * by[3];
-                }
-            };
-            self.each_row(i, state, free, |row, share| add(matrix.row_mut(row), share * amount));
+                row[basis.masters.len()..].iter_mut().zip(&tail).for_each(|(to, by)| *to += share * by);
+            });
         }
         let amount = state.amounts[basis.water];
         self.each_row(basis.water, state, free, |row, share| *matrix.at(row, places.solvent()) += share * amount);
