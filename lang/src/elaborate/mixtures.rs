@@ -1,12 +1,10 @@
 //! The mixtures of the model: their numbers, their extensive states, and what operations change of them.
 
-use std::collections::HashMap;
 use std::rc::Rc;
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::Operation;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{BinaryOp, NodeId, Op};
 use rustc_hash::FxHashMap;
 
 use crate::eval::lab::{Elaborator, ExtensiveKey};
@@ -21,25 +19,6 @@ impl Elaborator<'_> {
             }
         }
         out
-    }
-
-    /// What a value would be with a share of one mixture added to another one.
-    pub fn after_adding(&mut self, value: NodeId, share: NodeId, (from, to): (InstanceId, InstanceId)) -> NodeId {
-        let held = |id: InstanceId, lab: &Self| -> Vec<(ExtensiveKey, u32)> {
-            let first = ExtensiveKey { instance: id, member: String::new(), species: None, matter: false };
-            let all = lab.extensive.range(first..).take_while(|(key, _)| key.instance == id);
-            all.map(|(key, state)| (key.clone(), *state)).collect()
-        };
-        let gives: FxHashMap<_, _> =
-            held(from, self).into_iter().map(|(key, state)| ((key.member, key.species), state)).collect();
-        let mut states = HashMap::new();
-        for (key, state) in held(to, self) {
-            let Some(source) = gives.get(&(key.member, key.species)) else { continue };
-            let (there, comes) = (self.graph.add(Op::State(state)), self.graph.add(Op::State(*source)));
-            let comes = self.graph.binary(BinaryOp::Mul, share, comes);
-            states.insert(state, self.graph.binary(BinaryOp::Add, there, comes));
-        }
-        self.graph.with_states(value, &states)
     }
 
     /// Index of a mixture in the model.

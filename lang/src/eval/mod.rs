@@ -3,6 +3,7 @@
 //! The same evaluator checks a declaration (on prototypes of the instances it is about) and flattens it (on the lab's
 //! own), so that what was checked is what runs.
 
+mod adding;
 pub mod arith;
 pub mod call;
 pub mod coerce;

@@ -231,7 +231,11 @@ impl Problem<'_> {
             if places.strength() < free {
                 if self.system.virial.is_some() {
                     let (by_placed, at) = (self.by_placed(i, state), places.placed().start - basis.masters.len());
-                    tail[at..].iter_mut().zip(places.placed()).enumerate().for_each(|(j, (to, _))| *to = by_placed.of(j));
+                    tail[at..]
+                        .iter_mut()
+                        .zip(places.placed())
+                        .enumerate()
+                        .for_each(|(j, (to, _))| *to = by_placed.of(j));
                 }
                 if places.temperature() < free {
                     tail[places.temperature() - basis.masters.len()] = by[3];
