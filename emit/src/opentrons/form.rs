@@ -118,7 +118,12 @@ const FORMS: &[Form] = &[
     form("home", About::Robot, &[], &[("mount", Holds::Mount), ("plunger", Holds::Plunger)]),
     form("thermocycler/openLid", About::Module, &[], &[]),
     form("thermocycler/closeLid", About::Module, &[], &[]),
-    form("thermocycler/setTargetBlockTemperature", About::Module, &[("celsius", Number)], &[]),
+    form(
+        "thermocycler/setTargetBlockTemperature",
+        About::Module,
+        &[("celsius", Number)],
+        &[("blockMaxVolumeUl", Holds::Given)],
+    ),
     form("thermocycler/waitForBlockTemperature", About::Module, &[], &[]),
     form("thermocycler/deactivateBlock", About::Module, &[], &[]),
     form("thermocycler/setTargetLidTemperature", About::Module, &[("celsius", Number)], &[]),

@@ -35,7 +35,9 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
             let waits = |next: &&Command| next.name == *wait && next.text("moduleId") == command.text("moduleId");
             if commands.next_if(waits).is_some() {
                 let celsius = shown(command.params.get("celsius"));
-                script.line(&format!("{}.{call}({celsius})", command.text("moduleId")));
+                let volume = command.params.get("blockMaxVolumeUl");
+                let volume = volume.map_or(String::new(), |v| format!(", block_max_volume={}", shown(Some(v))));
+                script.line(&format!("{}.{call}({celsius}{volume})", command.text("moduleId")));
                 continue;
             }
         }

@@ -9,6 +9,7 @@ mod library;
 mod liquids;
 mod node;
 mod steps;
+mod tips;
 mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -104,7 +105,8 @@ fn steps<'a>(
     liquids: Liquids,
 ) -> Steps<'a> {
     let mut steps = Steps::new(analysis, deck, flows, liquids);
-    steps.park(&parked(analysis));
+    let parked = parked(analysis);
+    steps.park(&parked, tips::refills(&analysis.commands, deck, &parked));
     let is_step = |c: &Command| !c.command_type.starts_with("load");
     // The robot begins at home by itself.
     let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);
