@@ -165,9 +165,11 @@ class Case:
             found += same
         return sorted(found)
 
-    def goes_beside(self, numbers):
-        """Whether in all commands of these numbers a channel with a tip is over no well."""
-        return bool(numbers) and set(numbers) <= channels(json.loads(self.file("engine.json").read_text()))[1]
+    def goes_beside(self, said):
+        """Whether nothing is lost but commands in which a channel with a tip is over no well."""
+        if not said["lost"] or not all(reason.endswith(": some of its channels reach no well") for reason in said["lost"]):
+            return False
+        return set(said["numbers"]) <= channels(json.loads(self.file("engine.json").read_text()))[1]
 
     def outcome(self, upto):
         """What became of it: `pass`, `fault`, `uncounted` or `fail`, and why."""
@@ -184,7 +186,7 @@ class Case:
             known = self.fault(said["errors"])
             if known:
                 return "fault", f"{known[0][0]} of {known[0][1]}"
-        if said["lost"] and self.goes_beside(said["numbers"]):
+        if self.goes_beside(said):
             return "fault", "a channel over no well"
         if said["lost"]:
             return "fail", "lost: " + said["lost"][0]
@@ -215,7 +217,7 @@ def lost(err):
 
 
 def numbers(err):
-    """The numbers of the commands that were not imported."""
+    """The numbers of the commands that were not imported, as far as they are listed: the first ones for each reason."""
     lines = [line for line in err.splitlines() if line.strip().startswith("not imported because ")]
     return sorted({int(number) for line in lines for number in re.findall(r"\(command (\d+)\)", line)})
 

@@ -21,10 +21,11 @@ struct Well {
     is_source: bool,
 }
 
-/// A tip, uL.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tip {
-    liquid: f64,
+/// The tips of a pipette, uL: their pistons move together, but wells may hold less for some of them than for others.
+#[derive(Clone, Debug, Default)]
+struct Tips {
+    /// In each of them.
+    liquid: Vec<f64>,
     /// What the piston has taken up: liquid, and air.
     drawn: f64,
     /// Air at the end, which comes out first.
@@ -37,8 +38,8 @@ pub(super) struct Liquids {
     /// What wells hold at the start, where that is known, uL.
     initial: Option<BTreeMap<Name, f64>>,
     wells: BTreeMap<Name, Well>,
-    /// By pipette: what each of its tips holds.
-    tips: BTreeMap<String, Tip>,
+    /// By pipette: what its tips hold.
+    tips: BTreeMap<String, Tips>,
 }
 
 impl Liquids {
@@ -54,7 +55,7 @@ impl Liquids {
 
     /// Whether the tips of a pipette hold any liquid.
     pub(super) fn is_wet(&self, pipette: &str) -> bool {
-        self.tips.get(pipette).is_some_and(|tip| tip.liquid > 0.0)
+        self.tips.get(pipette).is_some_and(|tips| tips.liquid.iter().any(|liquid| *liquid > 0.0))
     }
 
     /// Each tip aspirates so much, at a height up to which a well holds `below`; whether the wells hold less.
@@ -67,7 +68,7 @@ impl Liquids {
         wells: &[String],
     ) -> bool {
         let each = volume * channels as f64 / wells.len().max(1) as f64;
-        let (mut taken, mut lacks) = (0.0_f64, false);
+        let (mut taken, mut lacks) = (Vec::new(), false);
         for well in wells {
             let name = (labware.to_owned(), well.clone());
             let initial = self.initial.as_ref().map(|initial| initial.get(&name).copied().unwrap_or(0.0));
@@ -79,45 +80,50 @@ impl Liquids {
             let there = initial.map_or(each, |initial| (initial + well.net) * (1.0 + 1e-9));
             let here = each.min(there.max(0.0));
             lacks |= here < each;
-            taken = taken.max(here);
+            taken.push(here);
             well.net -= here;
             well.least = well.least.min(well.net);
         }
-        let tip = self.tips.entry(pipette.to_owned()).or_default();
-        tip.liquid += taken * wells.len() as f64 / channels as f64;
-        tip.drawn += volume;
-        tip.air = 0.0;
+        let tips = self.tips.entry(pipette.to_owned()).or_default();
+        tips.liquid.resize(channels.max(tips.liquid.len()), 0.0);
+        let share = wells.len() as f64 / channels as f64;
+        for (channel, liquid) in tips.liquid.iter_mut().enumerate().take(channels) {
+            *liquid += taken.get(of(channel, wells)).map_or(0.0, |taken| taken * share);
+        }
+        tips.drawn += volume;
+        tips.air = 0.0;
         lacks
     }
 
     /// Each tip aspirates so much air.
     pub(super) fn air(&mut self, pipette: &str, volume: f64) {
-        let tip = self.tips.entry(pipette.to_owned()).or_default();
-        tip.drawn += volume;
-        tip.air += volume;
+        let tips = self.tips.entry(pipette.to_owned()).or_default();
+        tips.drawn += volume;
+        tips.air += volume;
     }
 
     /// Each tip dispenses so much: the air at its end first, then the same share of all that it holds, as `dispense` of the library does.
-    pub(super) fn dispense(&mut self, pipette: &str, volume: f64, channels: usize, labware: &str, wells: &[String]) {
-        let tip = self.tips.entry(pipette.to_owned()).or_default();
-        let (stroke, whole) = ((volume - tip.air).max(0.0), tip.drawn - tip.air);
-        let given = if stroke * (1.0 + 1e-9) >= whole { tip.liquid } else { tip.liquid * stroke / whole };
-        tip.liquid -= given;
-        tip.drawn = (tip.drawn - volume).max(0.0);
-        tip.air = (tip.air - volume).max(0.0);
-        self.fill(labware, wells, given * channels as f64);
+    pub(super) fn dispense(&mut self, pipette: &str, volume: f64, labware: &str, wells: &[String]) {
+        let tips = self.tips.entry(pipette.to_owned()).or_default();
+        let (stroke, whole) = ((volume - tips.air).max(0.0), tips.drawn - tips.air);
+        let share = if stroke * (1.0 + 1e-9) >= whole { 1.0 } else { stroke / whole };
+        let given: Vec<f64> = tips.liquid.iter().map(|liquid| liquid * share).collect();
+        tips.liquid.iter_mut().zip(&given).for_each(|(liquid, given)| *liquid -= given);
+        tips.drawn = (tips.drawn - volume).max(0.0);
+        tips.air = (tips.air - volume).max(0.0);
+        self.fill(labware, wells, &given);
     }
 
     /// Each tip gives off what it holds.
-    pub(super) fn blow_out(&mut self, pipette: &str, channels: usize, labware: &str, wells: &[String]) {
-        let tip = self.tips.remove(pipette).unwrap_or_default();
-        self.fill(labware, wells, tip.liquid * channels as f64);
+    pub(super) fn blow_out(&mut self, pipette: &str, labware: &str, wells: &[String]) {
+        let tips = self.tips.remove(pipette).unwrap_or_default();
+        self.fill(labware, wells, &tips.liquid);
     }
 
-    fn fill(&mut self, labware: &str, wells: &[String], volume: f64) {
-        for well in wells {
-            let well = self.wells.entry((labware.to_owned(), well.clone())).or_default();
-            well.net += volume / wells.len() as f64;
+    fn fill(&mut self, labware: &str, wells: &[String], given: &[f64]) {
+        for (channel, volume) in given.iter().enumerate() {
+            let Some(well) = wells.get(of(channel, wells)) else { continue };
+            self.wells.entry((labware.to_owned(), well.clone())).or_default().net += volume;
         }
     }
 
@@ -127,6 +133,11 @@ impl Liquids {
         let is_short = |well: &Well| well.is_source && -well.least > 1e-9;
         self.wells.iter().filter(move |(_, well)| is_short(well)).map(move |(name, well)| (name, needed(well)))
     }
+}
+
+/// Which of some wells a channel works in: its own, or the only one.
+fn of(channel: usize, wells: &[String]) -> usize {
+    if wells.len() == 1 { 0 } else { channel }
 }
 
 #[cfg(test)]
@@ -142,7 +153,7 @@ mod tests {
         let mut liquids = Liquids::default();
         liquids.aspirate("p", 50.0, (1, 10.0), "plate", &well("A1"));
         liquids.air("p", 10.0);
-        liquids.dispense("p", 60.0, 1, "plate", &well("B1"));
+        liquids.dispense("p", 60.0, "plate", &well("B1"));
         // More than there is: the rest is air.
         liquids.aspirate("p", 70.0, (1, 75.5), "plate", &well("B1"));
         liquids.aspirate("p", 1.0, (1, 75.5), "plate", &well("C1"));
@@ -156,7 +167,30 @@ mod tests {
         let mut liquids = Liquids::with(initial);
         assert!(!liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
         assert!(liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
-        liquids.dispense("p", 120.0, 1, "plate", &well("B1"));
+        liquids.dispense("p", 120.0, "plate", &well("B1"));
         assert!(!liquids.aspirate("p", 100.0, (1, 0.0), "plate", &well("B1")));
+    }
+
+    #[test]
+    fn each_channel_has_what_its_own_well_gave() {
+        let initial = [("A1", 5.0), ("B1", 50.0)].map(|(well, volume)| (("plate".to_owned(), well.to_owned()), volume));
+        let mut liquids = Liquids::with(BTreeMap::from(initial));
+        let column = ["A1", "B1"].map(str::to_owned);
+        for _ in 0..3 {
+            // Mixed in place, the first well never holds more than its own.
+            assert!(liquids.aspirate("p", 20.0, (2, 0.0), "plate", &column));
+            liquids.dispense("p", 20.0, "plate", &column);
+        }
+        assert!(!liquids.aspirate("p", 5.0, (2, 0.0), "plate", &column));
+    }
+
+    #[test]
+    fn channels_share_a_trough() {
+        let mut liquids = Liquids::default();
+        liquids.aspirate("p", 10.0, (8, 0.0), "trough", &well("A1"));
+        liquids.dispense("p", 10.0, "waste", &well("A1"));
+        let needed: Vec<f64> = liquids.needed().map(|(_, v)| v).collect();
+        assert_eq!(needed, [80.0]);
+        assert_eq!(liquids.wells[&("waste".to_owned(), "A1".to_owned())].net, 80.0);
     }
 }

@@ -324,17 +324,16 @@ impl<'a> Steps<'a> {
     }
 
     fn dispense(&mut self, command: &Command) -> Result<(), String> {
-        let (volume, channels) = (command.volume(), self.channels(command)?);
+        let volume = command.volume();
         let before = format!("dispense {} uL into ", number(volume));
         self.give(command, &before, Flow::Out, |liquids, labware, wells| {
-            liquids.dispense(command.text("pipetteId"), volume, channels, labware, wells);
+            liquids.dispense(command.text("pipetteId"), volume, labware, wells);
         })
     }
 
     fn blow_out(&mut self, command: &Command) -> Result<(), String> {
-        let channels = self.channels(command)?;
         self.give(command, "blow out into ", Flow::Blow, |liquids, labware, wells| {
-            liquids.blow_out(command.text("pipetteId"), channels, labware, wells);
+            liquids.blow_out(command.text("pipetteId"), labware, wells);
         })
     }
 
