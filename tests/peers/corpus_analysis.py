@@ -119,7 +119,8 @@ def engine_form():
 
     def hardware_state(self):
         pipettes, own = self._engine_client.state.pipettes, self._pipette_id
-        tip, volume = pipettes.get_attached_tip(own), pipettes.get_aspirated_volume(own)
+        tip = pipettes.get_attached_tip(own)
+        volume = 0.0 if tip is None else pipettes.get_aspirated_volume(own)
         return {
             "name": self.get_pipette_name(),
             "channels": pipettes.get_channels(own),

@@ -1,7 +1,7 @@
 """What an analysis of Opentrons' software does, in a form in which two can be compared.
 
 `deeds` lists what is done: verb, by what, where, how much, how. Two analyses do the same where their lists are the same: in order,
-volumes to 1e-9 uL, heights to 1e-6 mm, flow rates and speeds to 1e-9 of what they are, temperatures and times to 1e-9.
+volumes to 1e-9 uL (of a whole well 1e-12 of it, if that is more), heights to 1e-6 mm, flow rates and speeds to 1e-9 of what they are, temperatures and times to 1e-9.
 
 Not compared, as nothing physical: what is loaded, in which order, and what wells are said to hold at first; identifiers and labels;
 that the robot goes home before it does anything, which it does by itself; a move to where the pipette is, or to where the next step
@@ -311,7 +311,7 @@ def difference(before, after):
         return f"{two[0]} added", text
     one, two = volumes(before), volumes(after)
     for well in sorted(one.keys() | two.keys()):
-        if abs(one.get(well, 0.0) - two.get(well, 0.0)) > 1e-9:
+        if not math.isclose(one.get(well, 0.0), two.get(well, 0.0), rel_tol=1e-12, abs_tol=1e-9):
             return "volume of a well", f"{well}: {one.get(well)} became {two.get(well)}"
     return "", ""
 

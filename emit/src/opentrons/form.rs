@@ -37,6 +37,8 @@ pub(super) enum Holds {
     Origin,
     /// How far from that along an axis, mm.
     Offset,
+    /// How far from the corner of the deck along an axis, mm.
+    Coordinate,
     /// What a thing stands on: a place of the deck, or a module.
     Location,
     /// A labware definition by `NAMESPACE/NAME/VERSION`.
@@ -103,6 +105,12 @@ const FORMS: &[Form] = &[
     at(
         "moveToWell",
         &[("well", Well)],
+        &[("forceDirect", Flag), ("speed", Holds::Given), ("minimumZHeight", Holds::Given)],
+    ),
+    form(
+        "moveToCoordinates",
+        About::Pipette,
+        &[("x", Holds::Coordinate), ("y", Holds::Coordinate), ("z", Holds::Coordinate)],
         &[("forceDirect", Flag), ("speed", Holds::Given), ("minimumZHeight", Holds::Given)],
     ),
     form("aspirateInPlace", About::Pipette, &[("volume", Number), ("flowRate", Number)], &[]),

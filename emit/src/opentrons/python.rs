@@ -14,7 +14,7 @@ use crate::place;
 
 /// The file, or what the Python API has no call for.
 pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>> {
-    let mut script = Script { text: String::new(), rates: BTreeMap::new(), aimed: None };
+    let mut script = Script { text: String::new(), rates: BTreeMap::new(), targets: BTreeMap::new(), aimed: None };
     script.head(protocol);
     let mut found = Vec::new();
     for command in &protocol.loads {
@@ -29,6 +29,9 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
             said = Some(command.at);
             let (file, line, text) = place::line(protocol.subject.sources, command.at);
             script.line(&format!("# {file}:{line}: {text}"));
+        }
+        if command.name == "temperatureModule/setTargetTemperature" {
+            script.targets.insert(command.text("moduleId").to_owned(), shown(command.params.get("celsius")));
         }
         // One call brings a module to a temperature and waits for it.
         if let Some((_, wait, call)) = TEMPERED.iter().find(|(set, ..)| *set == command.name) {
@@ -64,6 +67,8 @@ struct Script {
     text: String,
     /// Flow rates as they were last set, by pipette and what flows.
     rates: BTreeMap<(String, &'static str), f64>,
+    /// What temperature modules were set to last, degC.
+    targets: BTreeMap<String, String>,
     /// The pipette that was brought over an area to drop its tip.
     aimed: Option<String>,
 }
@@ -97,7 +102,10 @@ impl Script {
             let offset = |axis: &str| c.params.get("wellLocation").and_then(|l| l["offset"][axis].as_f64());
             ["x", "y"].iter().any(|axis| offset(axis).is_some_and(|off| off != 0.0))
         };
-        if protocol.commands.iter().any(is_aside) {
+        let is_place = |c: &Command| c.name == "moveToCoordinates";
+        if protocol.commands.iter().any(is_place) {
+            self.text.push_str("from opentrons.types import Location, Point\n\n");
+        } else if protocol.commands.iter().any(is_aside) {
             self.text.push_str("from opentrons.types import Point\n\n");
         }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
@@ -201,7 +209,12 @@ impl Script {
                 offset("z"),
                 number("speed")
             )),
-            "moveToWell" => {
+            "moveToWell" | "moveToCoordinates" => {
+                let at = |axis: &str| shown(command.params.get("coordinates").map(|place| &place[axis]));
+                let spot = match command.name {
+                    "moveToWell" => spot,
+                    _ => format!("Location(Point({}, {}, {}), None)", at("x"), at("y"), at("z")),
+                };
                 let direct = command.params.get("forceDirect") == Some(&Value::Bool(true));
                 let direct = if direct { ", force_direct=True" } else { "" };
                 let given = |key: &str, name: &str| {
@@ -231,6 +244,10 @@ impl Script {
             "temperatureModule/setTargetTemperature" => {
                 self.line(&format!("{module}.start_set_temperature({})", number("celsius")));
             }
+            "temperatureModule/waitForTemperature" => match self.targets.get(module) {
+                Some(celsius) => self.line(&format!("{module}.await_temperature({celsius})")),
+                None => return false,
+            },
             "temperatureModule/deactivate" => self.line(&format!("{module}.deactivate()")),
             "magneticModule/engage" => self.line(&format!("{module}.engage(height_from_base={})", number("height"))),
             "magneticModule/disengage" => self.line(&format!("{module}.disengage()")),

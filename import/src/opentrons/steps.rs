@@ -139,6 +139,7 @@ impl<'a> Steps<'a> {
             "blowout" => self.blow_out(command),
             "touchTip" => self.touch(command),
             "moveToWell" => self.move_to(command),
+            "moveToCoordinates" => self.move_across(command),
             "airGapInPlace" | "aspirateInPlace" => self.air(command),
             "waitForDuration" => {
                 self.message(command);
@@ -181,7 +182,10 @@ impl<'a> Steps<'a> {
     pub(super) fn park(&mut self, racks: &BTreeSet<String>, refills: Refills) {
         self.refills = refills;
         for (id, rack) in self.deck.labware.iter().filter(|(id, _)| racks.contains(*id)) {
-            self.absent.insert(id.clone(), rack.order.iter().cloned().collect());
+            let places: BTreeSet<String> = rack.order.iter().cloned().collect();
+            self.absent.insert(id.clone(), places.clone());
+            // None of them is fresh: parked tips are taken by name.
+            self.taken.insert(id.clone(), places);
         }
     }
 
@@ -377,19 +381,31 @@ impl<'a> Steps<'a> {
     fn move_to(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
         let spot = self.spot(command)?;
-        let mut more = Vec::new();
-        if let Some(speed) = command.number("speed") {
-            more.push(format!("speed: {} mm/s", number(speed)));
-        }
-        if command.params["forceDirect"] == true {
-            more.push("direct: true".to_owned());
-        }
-        if let Some(clear) = command.number("minimumZHeight") {
-            more.push(format!("clear: {} mm", number(clear)));
+        let mut more = ways(command);
+        if self.deck.labware.get(command.text("labwareId")).is_some_and(|labware| labware.kind == Kind::Tips) {
+            if spot.above.abs() > DUST {
+                more.push(format!("z: {} mm", number(spot.above)));
+            }
+            let options = self.options(command, None, &more);
+            self.moved.remove(command.text("pipetteId"));
+            self.nodes.push(Node::about(&format!("move {by} above "), spot.place, &options));
+            return Ok(());
         }
         let options = self.options(command, None, &more);
         self.work(command, &format!("move {by} to "), "", spot, 0.0, &options);
         Ok(())
+    }
+
+    /// Moves to a place of the deck.
+    fn move_across(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let place = &command.params["coordinates"];
+        let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(|axis| place[axis].as_f64()) else {
+            return Err("it gives no place".to_owned());
+        };
+        self.moved.remove(command.text("pipetteId"));
+        let options = words::braced(&ways(command));
+        self.say(format!("move {by} across {} mm back {} mm up {} mm{options}", number(x), number(y), number(z)))
     }
 
     fn air(&mut self, command: &Command) -> Result<(), String> {
@@ -531,6 +547,21 @@ impl<'a> Steps<'a> {
         }
         out
     }
+}
+
+/// How a command moves, where it says so.
+fn ways(command: &Command) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(speed) = command.number("speed") {
+        out.push(format!("speed: {} mm/s", number(speed)));
+    }
+    if command.params["forceDirect"] == true {
+        out.push("direct: true".to_owned());
+    }
+    if let Some(clear) = command.number("minimumZHeight") {
+        out.push(format!("clear: {} mm", number(clear)));
+    }
+    out
 }
 
 /// ` at bottom + 2 mm`, from where the number is round; nothing where that is usual.
