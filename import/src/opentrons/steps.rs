@@ -388,7 +388,7 @@ impl<'a> Steps<'a> {
             }
             let options = self.options(command, None, &more);
             self.moved.remove(command.text("pipetteId"));
-            self.nodes.push(Node::about(&format!("move {by} above "), spot.place, &options));
+            self.nodes.push(Node::about(&format!("hover {by} at "), spot.place, &options));
             return Ok(());
         }
         let options = self.options(command, None, &more);
@@ -404,8 +404,8 @@ impl<'a> Steps<'a> {
             return Err("it gives no place".to_owned());
         };
         self.moved.remove(command.text("pipetteId"));
-        let options = words::braced(&ways(command));
-        self.say(format!("move {by} across {} mm back {} mm up {} mm{options}", number(x), number(y), number(z)))
+        let more: Vec<String> = [format!("x: {} mm", number(x)), format!("y: {} mm", number(y))].into_iter().chain(ways(command)).collect();
+        self.say(format!("steer {by} at {} mm{}", number(z), words::braced(&more)))
     }
 
     fn air(&mut self, command: &Command) -> Result<(), String> {
