@@ -4,6 +4,7 @@ overflow, underflow  A well is filled beyond what it holds, whatever it held at 
                      held.
 tip-used             Tips are picked up from places from which all were taken before, and none was put back. Where a pause speaks of
                      tips, every rack is full again.
+wrong-spot           Tips are put down where tips are. A rack into which tips are put before any is taken is empty at first.
 beside               A channel with a tip is over no well where its pipette works or goes."""
 
 import re
@@ -20,7 +21,7 @@ AT_WELLS = {"aspirate", "dispense", "blowout", "touchTip", "moveToWell"}
 
 
 def faults(analysis):
-    """Kinds of faults with the well of each: ("overflow", well), ("underflow", well), ("tip-used", well)."""
+    """Kinds of faults with the well of each, such as ("overflow", well)."""
     capacity = {}
     reader = Reader()
     for command in analysis["commands"]:
@@ -30,6 +31,12 @@ def faults(analysis):
         for well, of in labware["wells"].items():
             capacity[labware["where"], well] = of["totalLiquidVolume"]
     net, least, found = {}, {}, set()
+    for command in analysis["commands"]:
+        if command["commandType"] == "loadLiquid":
+            where = reader.labware[command["params"]["labwareId"]]["where"]
+            for well, volume in command["params"]["volumeByWell"].items():
+                if isinstance(volume, (int, float)) and volume > capacity[where, well] + DUST:
+                    found.add(("overflow", f"{well} of {where}"))
     for well, change in flows(analysis):
         net[well] = net.get(well, 0.0) + change
         # It held at least what left it, at its lowest.
@@ -40,18 +47,20 @@ def faults(analysis):
                 found.add(("overflow", f"{well[1]} of {well[0]}"))
             if -least[well] > capacity[well] + DUST:
                 found.add(("underflow", f"{well[1]} of {well[0]}"))
-    found |= {("tip-used", place) for place in channels(analysis)[0]}
-    return sorted(found)
+    return sorted(found | channels(analysis)[0])
 
 
 def channels(analysis):
-    """Places from which tips are taken twice, and the numbers of commands in which a channel with a tip is over no well."""
+    """Faults about tips, and the numbers of commands in which a channel with a tip is over no well."""
     reader, absent, tips = Reader(), set(), {}
-    twice, beside = set(), set()
+    found, beside, parking = set(), set(), parked(analysis)
     for number, command in enumerate(analysis["commands"], 1):
         kind, params = command["commandType"], command["params"]
         if kind in ("loadLabware", "loadPipette", "loadModule"):
-            reader.load(kind, params, command.get("result") or {})
+            result = command.get("result") or {}
+            reader.load(kind, params, result)
+            if result.get("labwareId") in parking:
+                absent |= {(result["labwareId"], well) for well in result["definition"]["wells"]}
         elif kind in ("waitForResume", "pause") and re.search(r"\btip", params.get("message") or "", re.IGNORECASE):
             absent.clear()
         elif kind == "setTipState":
@@ -65,16 +74,27 @@ def channels(analysis):
         places = [(params["labwareId"], name) for name in under if name]
         if kind == "pickUpTip":
             if places and all(place in absent for place in places):
-                twice.add(f"{well} of {labware['where']}")
+                found.add(("tip-used", f"{well} of {labware['where']}"))
             tips[params["pipetteId"]] = [name is not None and (params["labwareId"], name) not in absent for name in under]
             absent.update(places)
         elif kind == "dropTip":
+            if parameters["isTiprack"] and places and all(place not in absent for place in places):
+                found.add(("wrong-spot", f"{well} of {labware['where']}"))
             absent.difference_update(places)
         elif kind in AT_WELLS and "centerMultichannelOnWells" not in parameters.get("quirks", []):
             carry = tips.get(params["pipetteId"], [True] * many)
             if any(has and name is None for has, name in zip(carry, under)):
                 beside.add(number)
-    return twice, beside
+    return found, beside
+
+
+def parked(analysis):
+    """Racks into which tips are put before any is taken from there."""
+    first = {}
+    for command in analysis["commands"]:
+        if command["commandType"] in ("pickUpTip", "dropTip"):
+            first.setdefault(command["params"]["labwareId"], command["commandType"])
+    return {rack for rack, kind in first.items() if kind == "dropTip"}
 
 
 def over(wells, well, many):

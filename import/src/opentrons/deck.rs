@@ -247,9 +247,7 @@ impl Deck {
             return Err("several of its channels reach one well, and not in its middle".to_owned());
         }
         match cell(well) {
-            Some((1, number)) if reached == labware.column(well) => {
-                at(At::Column(number as usize, labware.columns()))
-            }
+            Some((1, number)) if reached == labware.column(well) => at(At::Column(number as usize, labware.columns())),
             _ => at(At::Wells(reached.into_iter().map(str::to_owned).collect())),
         }
     }

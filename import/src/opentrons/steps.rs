@@ -404,7 +404,8 @@ impl<'a> Steps<'a> {
             return Err("it gives no place".to_owned());
         };
         self.moved.remove(command.text("pipetteId"));
-        let more: Vec<String> = [format!("x: {} mm", number(x)), format!("y: {} mm", number(y))].into_iter().chain(ways(command)).collect();
+        let more: Vec<String> =
+            [format!("x: {} mm", number(x)), format!("y: {} mm", number(y))].into_iter().chain(ways(command)).collect();
         self.say(format!("steer {by} at {} mm{}", number(z), words::braced(&more)))
     }
 

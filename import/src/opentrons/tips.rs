@@ -26,9 +26,10 @@ pub(super) fn refills(commands: &[Command], deck: &Deck, parked: &BTreeSet<Strin
                 let Some(rack) = deck.labware.get(id).filter(|rack| rack.kind == Kind::Tips) else { continue };
                 let Some(mounted) = deck.pipettes.get(command.text("pipetteId")) else { continue };
                 let reached = rack.row(mounted.pipette.channels, command.text("wellName"));
-                let places: Vec<_> = reached.into_iter().flatten().map(|well| (id.to_owned(), well.to_owned())).collect();
+                let places: Vec<_> =
+                    reached.into_iter().flatten().map(|well| (id.to_owned(), well.to_owned())).collect();
                 if command.command_type == "dropTip" {
-                    places.iter().for_each(|place| drop(absent.remove(place)));
+                    absent.retain(|place, _| !places.contains(place));
                     continue;
                 }
                 // The last pause that asks for tips since then.

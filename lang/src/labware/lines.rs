@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::Span;
 
 use super::definition::{Definition, Opening, Well};
-use crate::ast::{Arg, At, AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, Grid, Name, Path, UnitText};
+use crate::ast::{Arg, AssetLine, AssetLiteral, At, Expr, ExprKind, Field, FieldValue, Grid, Name, Path, UnitText};
 use crate::eval::lab::grids::Place;
 
 /// Unevenness below which places are evenly spaced, mm: definitions are rounded to hundredths.
