@@ -18,7 +18,7 @@ The protocols are parted by the first byte of the SHA-256 of their folder's name
 made with; odd is the half held back (`--half held`).
 
 A protocol passes where all its commands are imported, `check` reports no error, and the two analyses do the same. Where `check`
-reports an overflow, a well that runs dry, a tip that was taken before or put onto another one, or the importer a channel that is over no well, and the
+reports an overflow, a well that runs dry, a tip that was taken before, put onto another one or does not fit, or the importer a channel that is over no well, and the
 original's own analysis shows the same without either (corpus_faults.py), the protocol is counted apart: a fault of the protocol's was
 found. Any other error is false, and the protocol fails.
 """
@@ -40,7 +40,7 @@ from corpus_compare import difference
 from corpus_faults import channels, faults
 
 #: Findings of `check`, and what corpus_faults.py calls them.
-CODES = {"volume-overflow": "overflow", "volume-underflow": "underflow", "tip-used": "tip-used", "wrong-spot": "wrong-spot"}
+CODES = {"volume-overflow": "overflow", "volume-underflow": "underflow", "tip-used": "tip-used", "wrong-spot": "wrong-spot", "wrong-tip": "wrong-tip"}
 STAGES = ["analyse", "import", "again", "compare", "report"]
 
 
@@ -159,6 +159,13 @@ class Case:
         found = []
         for error in errors:
             label = re.search(r"`\w+\[(\w+)\]`", error["text"])
+            if error["code"] == "wrong-tip":
+                # The whole rack is named.
+                same = [f for f in known if f[0] == "wrong-tip"]
+                if not same:
+                    return None
+                found += same
+                continue
             same = [f for f in known if label and CODES.get(error["code"]) == f[0] and f[1].startswith(f"{label[1]} of ")]
             if not same:
                 return None

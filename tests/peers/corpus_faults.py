@@ -5,8 +5,12 @@ overflow, underflow  A well is filled beyond what it holds, whatever it held at 
 tip-used             Tips are picked up from places from which all were taken before, and none was put back. Where a pause speaks of
                      tips, every rack is full again.
 wrong-spot           Tips are put down where tips are. A rack into which tips are put before any is taken is empty at first.
+wrong-tip            Tips are picked up that do not fit the pipette, by its definition.
 beside               A channel with a tip is over no well where its pipette works or goes."""
 
+import functools
+import importlib.resources
+import json
 import re
 
 from corpus_compare import Reader, flows
@@ -75,6 +79,9 @@ def channels(analysis):
         if kind == "pickUpTip":
             if places and all(place in absent for place in places):
                 found.add(("tip-used", f"{well} of {labware['where']}"))
+            name = reader.pipettes[params["pipetteId"]][1]
+            if labware["wells"][well]["totalLiquidVolume"] not in tips_of(name):
+                found.add(("wrong-tip", f"{well} of {labware['where']}"))
             tips[params["pipetteId"]] = [name is not None and (params["labwareId"], name) not in absent for name in under]
             absent.update(places)
         elif kind == "dropTip":
@@ -86,6 +93,17 @@ def channels(analysis):
             if any(has and name is None for has, name in zip(carry, under)):
                 beside.add(number)
     return found, beside
+
+
+@functools.cache
+def tips_of(pipette):
+    """Volumes of the tips that a pipette takes, uL: `p300_single_gen2` has definitions of its second version."""
+    model, kind, *generation = pipette.split("_")
+    folder = "eight_channel" if kind == "multi" else "single_channel"
+    version = "2_0" if generation else "1_0"
+    path = f"data/pipette/definitions/2/liquid/{folder}/{model}/default/{version}.json"
+    known = importlib.resources.files("opentrons_shared_data").joinpath(path).read_text()
+    return {float(tip[1:]) for tip in json.loads(known)["supportedTips"]}
 
 
 def parked(analysis):
