@@ -246,6 +246,27 @@ fn what_is_aspirated_at_the_rim_is_air() {
 }
 
 #[test]
+fn what_is_aspirated_above_the_bin_is_air() {
+    let flow = json!({ "volume": 20.0, "flowRate": 92.86 });
+    let steps = vec![
+        at("pickUpTip", "tips", "A1", 0.0, json!({})),
+        at("aspirate", "fixedTrash", "A1", 0.0, flow.clone()),
+        at("dispense", "fixedTrash", "A1", 0.0, flow.clone()),
+        at("dropTip", "fixedTrash", "A1", 0.0, json!({})),
+    ];
+    let (err, text) = listed("above_the_bin", steps);
+    assert!(
+        err.is_empty() && text.contains("move ot2.left to ot2.trash[A1]\n    air gap 20 uL by ot2.left"),
+        "{err}{text}"
+    );
+    let dir = folder("above_the_bin_emitted");
+    write(&dir, "a.mtx", text);
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert_eq!(emitted.code, 0, "{}", emitted.err);
+    assert!(emitted.out.contains(".move_to(protocol.fixed_trash)"), "{}", emitted.out);
+}
+
+#[test]
 fn a_tip_may_go_back_with_its_liquid() {
     let steps = vec![
         at("pickUpTip", "tips", "A1", 0.0, json!({})),

@@ -88,6 +88,9 @@ def channels(analysis):
             if parameters["isTiprack"] and places and all(place not in absent for place in places):
                 found.add(("wrong-spot", f"{well} of {labware['where']}"))
             absent.difference_update(places)
+            carry = tips.pop(params["pipetteId"], [True] * many)
+            if parameters["isTiprack"] and any(has and name is None for has, name in zip(carry, under)):
+                beside.add(number)
         elif kind in AT_WELLS and "centerMultichannelOnWells" not in parameters.get("quirks", []):
             carry = tips.get(params["pipetteId"], [True] * many)
             if any(has and name is None for has, name in zip(carry, under)):

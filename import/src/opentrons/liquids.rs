@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 /// A well by labware and name.
 pub(super) type Name = (String, String);
 
+/// By well, a volume in uL.
+pub(super) type Holdings = BTreeMap<Name, f64>;
+
 /// What wells hold at the start: volume in uL, and what of.
 pub(super) type Holding = BTreeMap<Name, (f64, String)>;
 
@@ -15,6 +18,10 @@ struct Well {
     net: f64,
     /// The least that it ever was.
     least: f64,
+    /// The most that it ever was.
+    most: f64,
+    /// The least that it was before that.
+    before: f64,
     /// What must be there at the start so that tips reached the liquid.
     wet: f64,
     /// Whether something left it before anything came: it is a source, and was not filled on the way.
@@ -36,7 +43,7 @@ struct Tips {
 #[derive(Debug, Default)]
 pub(super) struct Liquids {
     /// What wells hold at the start, where that is known, uL.
-    initial: Option<BTreeMap<Name, f64>>,
+    initial: Option<Holdings>,
     wells: BTreeMap<Name, Well>,
     /// By pipette: what its tips hold.
     tips: BTreeMap<String, Tips>,
@@ -44,7 +51,7 @@ pub(super) struct Liquids {
 
 impl Liquids {
     /// Wells that hold so much at the start, uL.
-    pub(super) fn with(initial: BTreeMap<Name, f64>) -> Liquids {
+    pub(super) fn with(initial: Holdings) -> Liquids {
         Liquids { initial: Some(initial), ..Liquids::default() }
     }
 
@@ -123,15 +130,24 @@ impl Liquids {
     fn fill(&mut self, labware: &str, wells: &[String], given: &[f64]) {
         for (channel, volume) in given.iter().enumerate() {
             let Some(well) = wells.get(of(channel, wells)) else { continue };
-            self.wells.entry((labware.to_owned(), well.clone())).or_default().net += volume;
+            let well = self.wells.entry((labware.to_owned(), well.clone())).or_default();
+            well.net += volume;
+            if well.net > well.most {
+                (well.most, well.before) = (well.net, well.least);
+            }
         }
     }
 
-    /// What sources must hold at the start, uL, by labware and well: what leaves them, and, rounded up, what tips must reach.
-    pub(super) fn needed(&self) -> impl Iterator<Item = (&Name, f64)> {
-        let needed = |well: &Well| if well.wet > -well.least { well.wet.ceil() } else { -well.least };
+    /// What sources must hold at the start, uL, by labware and well: what leaves them, and, rounded up, what tips must reach. Less than that
+    /// where what comes would not find room: tips take air for the rest then.
+    pub(super) fn needed(&self, capacity: impl Fn(&Name) -> f64) -> Holdings {
+        let needed = |name: &Name, well: &Well| {
+            let room = capacity(name) - well.most;
+            well.wet.ceil().max(-well.least).min(room).max(-well.before)
+        };
         let is_short = |well: &Well| well.is_source && -well.least > 1e-9;
-        self.wells.iter().filter(move |(_, well)| is_short(well)).map(move |(name, well)| (name, needed(well)))
+        let short = self.wells.iter().filter(|(_, well)| is_short(well));
+        short.map(|(name, well)| (name.clone(), needed(name, well))).collect()
     }
 }
 
@@ -157,8 +173,18 @@ mod tests {
         // More than there is: the rest is air.
         liquids.aspirate("p", 70.0, (1, 75.5), "plate", &well("B1"));
         liquids.aspirate("p", 1.0, (1, 75.5), "plate", &well("C1"));
-        let needed: Vec<(String, f64)> = liquids.needed().map(|((_, well), v)| (well.clone(), v)).collect();
-        assert_eq!(needed, [("A1".to_owned(), 50.0), ("C1".to_owned(), 76.0)]);
+        let needed = |capacity: f64| -> Vec<(String, f64)> {
+            liquids.needed(|_| capacity).into_iter().map(|((_, well), v)| (well, v)).collect()
+        };
+        assert_eq!(needed(200.0), [("A1".to_owned(), 50.0), ("C1".to_owned(), 76.0)]);
+        // What tips must reach leaves room for what comes: 71 uL, where 1 uL went.
+        liquids.blow_out("p", "plate", &well("C1"));
+        let needed: Vec<f64> = liquids.needed(|_| 100.0).into_values().collect();
+        assert_eq!(needed, [50.0, 30.0]);
+        // No more room than that, even if all of it leaves in the end.
+        liquids.aspirate("p", 130.0, (1, 0.0), "plate", &well("C1"));
+        let needed: Vec<f64> = liquids.needed(|_| 100.0).into_values().collect();
+        assert_eq!(needed, [50.0, 30.0]);
     }
 
     #[test]
@@ -189,7 +215,7 @@ mod tests {
         let mut liquids = Liquids::default();
         liquids.aspirate("p", 10.0, (8, 0.0), "trough", &well("A1"));
         liquids.dispense("p", 10.0, "waste", &well("A1"));
-        let needed: Vec<f64> = liquids.needed().map(|(_, v)| v).collect();
+        let needed: Vec<f64> = liquids.needed(|_| 1000.0).into_values().collect();
         assert_eq!(needed, [80.0]);
         assert_eq!(liquids.wells[&("waste".to_owned(), "A1".to_owned())].net, 80.0);
     }

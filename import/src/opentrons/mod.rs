@@ -119,9 +119,10 @@ fn steps<'a>(
 /// What the protocol says that wells hold; else, of sources, what they need, as far as it fits in.
 fn holding(steps: &Steps<'_>, commands: &[Command], deck: &Deck) -> Holding {
     let mut out = steps.loaded(commands);
-    for (well, needed) in steps.liquids.needed() {
-        let most = deck.capacity(&well.0, &well.1);
-        out.entry(well.clone()).or_insert_with(|| (needed.min(most), "water".to_owned()));
+    let capacity = |(labware, well): &(String, String)| deck.capacity(labware, well);
+    for (well, needed) in steps.liquids.needed(capacity) {
+        let most = capacity(&well);
+        out.entry(well).or_insert_with(|| (needed.min(most), "water".to_owned()));
     }
     out
 }

@@ -303,6 +303,14 @@ impl<'a> Steps<'a> {
     fn aspirate(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
         let id = command.text("pipetteId");
+        let location = &command.params["wellLocation"];
+        let is_above = location["origin"] == "top" && location["offset"]["z"].as_f64().is_none_or(|z| z > -DUST);
+        // Above the bin there is nothing but air.
+        if command.text("labwareId") == TRASH && is_above {
+            self.moved.remove(id);
+            self.nodes.push(Node::plain(format!("move {by} to ot2.trash[A1]")));
+            return self.air_gap(command, &by);
+        }
         let spot = self.spot(command)?;
         // What is aspirated at the rim or above it is air.
         if spot.above > -DUST {
