@@ -1,6 +1,6 @@
 //! A protocol as Python.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use matterix_ir::{Diagnostic, Span};
@@ -14,7 +14,13 @@ use crate::place;
 
 /// The file, or what the Python API has no call for.
 pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>> {
-    let mut script = Script { text: String::new(), rates: BTreeMap::new(), targets: BTreeMap::new(), aimed: None };
+    let mut script = Script {
+        text: String::new(),
+        rates: BTreeMap::new(),
+        targets: BTreeMap::new(),
+        binned: BTreeSet::new(),
+        aimed: None,
+    };
     script.head(protocol);
     let mut found = Vec::new();
     for command in &protocol.loads {
@@ -69,6 +75,8 @@ struct Script {
     rates: BTreeMap<(String, &'static str), f64>,
     /// What temperature modules were set to last, degC.
     targets: BTreeMap<String, String>,
+    /// Pipettes that were at the bin last: it is no place for what is done in place.
+    binned: BTreeSet<String>,
     /// The pipette that was brought over an area to drop its tip.
     aimed: Option<String>,
 }
@@ -185,6 +193,11 @@ impl Script {
         let spot = spot(command, &well);
         let offset = |axis: &str| shown(command.params.get("wellLocation").map(|location| &location["offset"][axis]));
         let aimed = self.aimed.take();
+        match (text("labwareId"), command.params.contains_key("coordinates")) {
+            (BIN, _) => drop(self.binned.insert(pipette.to_owned())),
+            ("", false) => {}
+            _ => drop(self.binned.remove(pipette)),
+        }
         match command.name {
             "pickUpTip" => self.line(&format!("{pipette}.pick_up_tip({spot})")),
             "aspirate" => {
@@ -199,6 +212,7 @@ impl Script {
                 self.rate(command, "blow_out");
                 self.line(&format!("{pipette}.blow_out({spot})"));
             }
+            "aspirateInPlace" if self.binned.contains(pipette) => return false,
             "aspirateInPlace" => {
                 self.rate(command, "aspirate");
                 self.line(&format!("{pipette}.aspirate({})", number("volume")));
