@@ -100,6 +100,7 @@ fn item(item: &Item) -> Option<Symbol> {
         ItemKind::Relation { .. } => ("relation", SymbolKind::Function),
         ItemKind::Fn { .. } => ("fn", SymbolKind::Function),
         ItemKind::Const { .. } => ("const", SymbolKind::Constant),
+        ItemKind::Table { .. } => ("table", SymbolKind::Constant),
         ItemKind::Framing { .. } => ("framing", SymbolKind::Driver),
         ItemKind::Driver { .. } => ("driver", SymbolKind::Driver),
         ItemKind::Lab { .. } => ("lab", SymbolKind::Lab),

@@ -165,7 +165,8 @@ module.exports = grammar({
     type_arguments: ($) => seq('<', $._name, repeat(seq('&', $._name)), optional($.type_arguments), '>'),
     parameters: ($) => seq('(', nl($), optional(listed($, $.parameter)), ')'),
     parameter: ($) => seq(
-      field('name', $.identifier), optional(seq(':', nl($), field('type', $.type))), optional(seq('of', nl($), field('of', $.identifier))),
+      field('name', $.identifier), optional(seq(':', nl($), field('type', $.type), optional(seq('in', nl($), field('allowed', $._operand))))),
+      optional(seq('of', nl($), field('of', $.identifier))),
       optional(seq('=', nl($), field('default', $.expression))),
     ),
     _signature: ($) => signature_of($, $.verb),
@@ -197,8 +198,8 @@ module.exports = grammar({
       alias($._first_word, $.verb_word), repeat(alias($._next_word, $.verb_word)), optional($._operand), repeat($.labelled), $.options,
     ),
     statement: ($) => choice(
-      $.let_statement, $.wait_statement, $.step_statement, $.if_statement, $.repeat_statement, $.for_statement, $.within_statement,
-      $.hold_statement, $.keep_statement, $.try_statement, $.retry_statement, $.claim_statement, $.sequence_statement, $.parallel_statement,
+      $.let_statement, $.var_statement, $.set_statement, $.wait_statement, $.step_statement, $.if_statement, $.repeat_statement,
+      $.for_statement, $.within_statement, $.hold_statement, $.keep_statement, $.try_statement, $.retry_statement, $.claim_statement, $.sequence_statement, $.parallel_statement,
       $.start_statement, $.await_statement, $.fail_statement, $.expect_statement, $.record_statement, $.note_statement, $.ask_statement,
       $.return_statement, $.call,
     ),
@@ -206,6 +207,13 @@ module.exports = grammar({
       seq('<-', nl($), field('value', $.call)),
       seq(optional(seq(':', field('type', $.type))), '=', nl($), field('value', $.expression)),
     )),
+    // `var` is a name elsewhere; src/scanner.c looks ahead.
+    var_statement: ($) => seq(
+      'var', field('name', $.identifier), optional(seq(':', field('type', $.type))), '=', nl($), field('value', $.expression),
+    ),
+    set_statement: ($) => seq(
+      field('name', $.identifier), field('operator', choice('+=', '-=', '=')), nl($), field('value', $.expression),
+    ),
     wait_statement: ($) => seq('wait', $._same_line, choice(
       seq('until', field('condition', $.expression), optional($.timeout), optional($._handlers)),
       field('duration', $._operand),
@@ -279,7 +287,14 @@ module.exports = grammar({
     declaration: ($) => choice(
       $.use, $.dimension, $.unit_declaration, $.species_declaration, $.solution, $.reaction, $.interaction, $.capability, $.asset, $.process, $.event,
       $.relation, $.function, $.constant, $.reactive_group, $.material, $.incompatible, $.allow, $.hazard, $.framing, $.driver, $.lab, $.skill,
-      $.workflow, $.study, $.fit, $.test,
+      $.workflow, $.study, $.fit, $.test, $.table,
+    ),
+    table: ($) => seq('table', field('name', $.identifier), $.source, field('body', $.columns)),
+    columns: ($) => fields_of($, $.column),
+    column: ($) => seq(
+      field('name', alias($._any_word, $.field_name)), optional(field('header', $.string)), ':', nl($), field('type', $.type),
+      optional(seq('as', nl($), field('unit', alias($._unit_after_as, $.unit)))),
+      optional(seq('=', nl($), field('default', $.expression))),
     ),
     use: ($) => seq('use', field('path', $._name), optional(seq(
       choice('::', token.immediate('::')), '{', nl($), listed($, $.identifier), '}',

@@ -32,6 +32,7 @@ pub mod prose;
 pub mod reference;
 pub mod semantic_index;
 mod session;
+mod sheet;
 mod sila;
 mod stop;
 mod study;

@@ -10,7 +10,7 @@ use crate::loader::Loader;
 use crate::names::{Module, Names, module_candidates, used as used_in};
 use crate::parallel::STACK;
 use crate::session::{self, Session};
-use crate::{import, library};
+use crate::{import, library, sheet};
 
 /// Parses the root file and everything it imports; the library comes first.
 ///
@@ -81,6 +81,12 @@ pub fn load(
         for module in modules.iter_mut().filter(|module| import::has_features(&module.tree)) {
             let module = Arc::make_mut(module);
             diagnostics.extend(session::features(session, module, &units, sources, loader));
+        }
+    }
+    if modules.iter().any(|m| sheet::has_tables(&m.tree)) {
+        let units = declare(&Names::new(&modules).0, &mut Vec::new());
+        for module in modules.iter_mut().filter(|module| sheet::has_tables(&module.tree)) {
+            diagnostics.extend(session::tables(session, Arc::make_mut(module), &units, sources, loader));
         }
     }
     (modules, diagnostics)

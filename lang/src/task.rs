@@ -63,7 +63,14 @@ pub fn tested<'a>(tables: &Tables<'a>, test: DeclId) -> Result<Option<Tested<'a>
         return Err(Box::new(d));
     };
     for (_, stmt) in stmts {
-        if !matches!(stmt.kind, StmtKind::Expect { .. } | StmtKind::Let { .. } | StmtKind::Note(_)) {
+        if !matches!(
+            stmt.kind,
+            StmtKind::Expect { .. }
+                | StmtKind::Let { .. }
+                | StmtKind::Var { .. }
+                | StmtKind::Set { .. }
+                | StmtKind::Note(_)
+        ) {
             let headline = "after the run of its workflow a test can only `expect`".to_string();
             return Err(Box::new(misplaced(stmt.span, headline, "not an `expect`")));
         }

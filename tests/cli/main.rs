@@ -56,6 +56,7 @@ mod pages;
 mod physique;
 mod pipeline_tests;
 mod plan;
+mod plans;
 mod protocols;
 mod reached;
 mod reacting;

@@ -8,7 +8,7 @@ use super::{Offers, steps};
 const BEFORE_VALUES: &[&str] = &[
     "and", "or", "not", "is", "of", "until", "while", "if", "expect", "hold", "keep", "keeps", "ends", "repeat",
     "within", "for", "timeout", "every", "after", "max", "record", "claim", "return", "await", "start", "step", "let",
-    "wait", "note", "ask", "fail", "retry", "when", "needs", "presumes", "warns", "else", "try", "times", "run",
+    "var", "wait", "note", "ask", "fail", "retry", "when", "needs", "presumes", "warns", "else", "try", "times", "run",
     "include",
 ];
 
@@ -49,7 +49,7 @@ impl Place<'_> {
             "try" | "sequence" | "parallel" => (&[], false),
             "for" | "step" | "await" | "claim" | "retry" | "note" | "ask" | "fail" => (&[], false),
             "let" if statement.len() == 2 => (&["=", "<-"], false),
-            "start" if statement.len() == 2 => (&["="], false),
+            "start" | "var" if statement.len() == 2 => (&["="], false),
             "if" | "expect" | "keep" => (&[], true),
             "let" | "return" => (&["of"], true),
             _ => (&["of", "as"], false),

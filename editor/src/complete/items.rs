@@ -29,6 +29,7 @@ const ITEMS: &[(&str, &str)] = &[
     ("relation", "relation ${1:name}(${2:a}: ${3:Body}, ${4:b}: ${3:Body}) = $0"),
     ("fn", "fn ${1:name}(${2:x}: ${3:Ratio}) = $0"),
     ("const", "const ${1:name} = $0"),
+    ("table", "table ${1:plan} from csv \"${2:plan.csv}\" {\n    well: Place, ${3:volume: Volume as uL}\n}"),
     ("lab", "lab ${1:bench} {\n    ambient: ${2:22 degC}\n    $0\n}"),
     ("framing", "framing ${1:name} { carries: ${2:text}, frame: \"$0{data}\\r\" }"),
     ("driver", "driver ${1:Name} for ${2:Asset} over ${3:serial}(${4:baud: 9600}) {\n    $0\n}"),

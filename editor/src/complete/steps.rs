@@ -14,6 +14,7 @@ use crate::index::{Def, DefId, Kind};
 /// Steps of the language.
 pub(crate) const STEPS: &[(&str, &str)] = &[
     ("let", "let ${1:name} = $0"),
+    ("var", "var ${1:name} = $0"),
     ("wait", "wait ${1:10 s}"),
     ("wait until", "wait until ${1:condition} timeout ${2:10 min}"),
     ("hold", "hold ${1:condition} for ${2:10 min} timeout ${3:1 h}"),

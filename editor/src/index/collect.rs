@@ -264,7 +264,7 @@ fn kind_of(kind: &ItemKind) -> Option<Kind> {
         ItemKind::Event(_) => Kind::Event,
         ItemKind::Relation { .. } => Kind::Relation,
         ItemKind::Fn { .. } => Kind::Function,
-        ItemKind::Const { .. } => Kind::Constant,
+        ItemKind::Const { .. } | ItemKind::Table { .. } => Kind::Constant,
         ItemKind::Framing { .. } => Kind::Framing,
         ItemKind::Driver { .. } => Kind::Driver,
         ItemKind::Lab { .. } => Kind::Lab,

@@ -20,7 +20,7 @@
 (header "mtx" @keyword)
 [
   "use" "dimension" "unit" "species" "solution" "reaction" "equilibrium" "interaction" "reactive_group" "material" "incompatible" "allow" "hazard" "caution"
-  "capability" "asset" "process" "event" "relation" "extern" "fn" "const" "framing" "driver" "lab" "skill" "workflow" "study" "fit" "test"
+  "capability" "asset" "process" "event" "relation" "extern" "fn" "const" "framing" "driver" "lab" "skill" "workflow" "study" "fit" "test" "table"
   "point" "prefixes" "labelled" "symmetric" "also" "any" "where" "when" "per"
 ] @keyword
 
@@ -36,7 +36,7 @@
 ] @keyword
 
 ; ---- steps
-[ "let" "step" "claim" "record" "note" "ask" "expect" "keep" "hold" "start" "sequence" "parallel" ] @keyword
+[ "let" "var" "step" "claim" "record" "note" "ask" "expect" "keep" "hold" "start" "sequence" "parallel" ] @keyword
 [ "wait" "await" "until" "timeout" "within" "after" "every" "times" "max" ] @keyword.control
 [ "if" "else" ] @keyword.control.conditional
 [ "repeat" "for" "while" ] @keyword.control.repeat
@@ -96,6 +96,7 @@
   (material name: (identifier) @constant)
   (reactive_group name: (identifier) @constant)
   (constant name: (identifier) @constant)
+  (table name: (identifier) @constant)
 ]
 ((use (identifier) @type) (#match? @type "^[A-Z]"))
 ((use path: (scoped_name name: (identifier) @type)) (#match? @type "^[A-Z]"))
@@ -106,6 +107,8 @@
 (parameter name: (identifier) @variable.parameter)
 (named_argument name: (identifier) @variable.parameter)
 (let_statement name: (identifier) @variable)
+(var_statement name: (identifier) @variable)
+(set_statement name: (identifier) @variable)
 (law_let name: (identifier) @variable)
 (for_statement name: (identifier) @variable)
 (law_for name: (identifier) @variable)

@@ -5,6 +5,7 @@
 
 (parameter name: (identifier) @local.definition.parameter)
 (let_statement name: (identifier) @local.definition.var)
+(var_statement name: (identifier) @local.definition.var)
 (law_let name: (identifier) @local.definition.var)
 (for_statement name: (identifier) @local.definition.var)
 (law_for name: (identifier) @local.definition.var)

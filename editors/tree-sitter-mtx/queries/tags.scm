@@ -7,6 +7,7 @@
 (asset name: (identifier) @name) @definition.class
 (lab name: (identifier) @name) @definition.module
 (constant name: (identifier) @name) @definition.constant
+(table name: (identifier) @name) @definition.constant
 (solution name: (identifier) @name) @definition.constant
 (reaction name: (identifier) @name) @definition.constant
 (interaction name: (identifier) @name) @definition.constant

@@ -240,6 +240,24 @@ static bool scan_unit(TSLexer *lexer, enum Token token) {
 // ---- words
 
 // Whether the word that has been read can be one of a verb; the next ones must not begin a calculation.
+// Whether `=`, `+=` or `-=` follows the first word of a step, or the word after it: `n += 1`, `var n: Ratio = 0`.
+static bool is_assigned(TSLexer *lexer) {
+    while (is_blank(next(lexer))) advance(lexer);
+    if (accept(lexer, '+') || accept(lexer, '-')) return next(lexer) == '=';
+    if (accept(lexer, '=')) return next(lexer) != '=';
+    return false;
+}
+
+// Whether `var` declares a name. Where it does not, the step begins with a verb of several words, of which the second has been passed.
+static bool is_declared(TSLexer *lexer, Word *word) {
+    if (strcmp(word->text, " var ") != 0 || !is_blank(next(lexer))) return false;
+    while (is_blank(next(lexer))) advance(lexer);
+    if (!is_letter(next(lexer)) && next(lexer) != '_') return false;
+    while (is_idc(next(lexer))) advance(lexer);
+    while (is_blank(next(lexer))) advance(lexer);
+    return next(lexer) == ':' || is_assigned(lexer);
+}
+
 static bool is_bare_word(TSLexer *lexer, bool first) {
     switch (next(lexer)) {
         case '(': case '[': case '\'': return false;
@@ -251,7 +269,7 @@ static bool is_bare_word(TSLexer *lexer, bool first) {
             advance(lexer);
             return next(lexer) != ':';
     }
-    if (first) return true;
+    if (first) return !is_assigned(lexer);
     if (!skip_space(lexer, true)) return false;
     if (next(lexer) == 'o') {
         Word word;
@@ -348,7 +366,7 @@ static bool scan_word(TSLexer *lexer, const bool *valid) {
     lexer->mark_end(lexer);
     if (valid[FIRST_WORD] || valid[NEXT_WORD]) {
         bool first = valid[FIRST_WORD];
-        if (is_reserved(lexer, &word) || !is_bare_word(lexer, first)) return false;
+        if (is_reserved(lexer, &word) || (first && is_declared(lexer, &word)) || !is_bare_word(lexer, first)) return false;
         return found(lexer, first ? FIRST_WORD : NEXT_WORD);
     }
     if (valid[STATE_WORD] && is_one_of(&word, LABELS)) return is_state_word(lexer) && found(lexer, STATE_WORD);

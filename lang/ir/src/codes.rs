@@ -73,6 +73,8 @@ codes! {
     WRONG_ARGUMENTS "wrong-arguments" "N0" "the arguments do not fit the call";
     WRONG_DEVICE "wrong-device" "N0" "a command for a device that cannot carry it out";
     TYPE_MISMATCH "type-mismatch" "N0" "a value of another type than expected";
+    TABLE_FILE "table-file" "N0" "a table cannot be read, or a row or cell of it";
+    UNDECIDED_CHANGE "undecided-change" "N0" "a `var` changes where only the run decides";
     CANNOT_VARY "cannot-vary" "N0" "a study or fit varies something that is fixed";
     DATA_FILE "data-file" "N0" "the data of a fit cannot be read";
     UNBOUND_ROLE "unbound-role" "N0" "the thing for a role, or the lab, is ambiguous or missing";

@@ -111,6 +111,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             lab.truth(body, &mut scope);
         }
         ItemKind::Const { name, .. } => drop(lab.declared(id, name)),
+        ItemKind::Table { .. } => lab.check_table(id),
         ItemKind::Solution { .. } => {
             lab.composition(id);
             lab.check_label(id);

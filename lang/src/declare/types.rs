@@ -30,6 +30,8 @@ pub enum Type {
     Bool,
     /// A text.
     Text,
+    /// The name of a place of a grid: `A1`.
+    Place,
     /// One of these words.
     Enum(Arc<[String]>),
     /// A species.
@@ -67,7 +69,7 @@ impl Type {
 
 /// Names of types that are not dimensions, capabilities or assets.
 const BUILT_IN: &[&str] =
-    &["Bool", "Text", "Int", "Species", "Reaction", "Material", "Frame", "Range", "List", "Color", "Any"];
+    &["Bool", "Text", "Place", "Int", "Species", "Reaction", "Material", "Frame", "Range", "List", "Color", "Any"];
 
 impl Tables<'_> {
     /// Resolves a type as written in a module, where no `where` can be looked at.
@@ -99,6 +101,7 @@ impl Tables<'_> {
             match name.text.as_str() {
                 "Bool" => return Type::Bool,
                 "Text" => return Type::Text,
+                "Place" => return Type::Place,
                 "Int" => return Type::Int,
                 "Species" => return Type::Species,
                 "Reaction" => return Type::Reaction,
@@ -147,6 +150,7 @@ impl Tables<'_> {
             Type::Int => "a whole number".into(),
             Type::Bool => "a truth value".into(),
             Type::Text => "a text".into(),
+            Type::Place => "a place such as `A1`".into(),
             Type::Enum(words) => format!("one of {}", list(words)),
             Type::Species => "a species".into(),
             Type::Reaction => "a reaction".into(),

@@ -425,6 +425,8 @@ impl<'a> Elaborator<'a> {
                 Value::Bool(self.graph.binary(BinaryOp::Lt, zero, n.node))
             }
             Type::Text => Value::Text(String::new()),
+            // Which place it is decides what is there.
+            Type::Place => Value::Error,
             Type::Enum(words) => match self.placeholder(&Type::ratio(), name) {
                 Value::Num(n) => Value::Enum(n.node, words.clone()),
                 _ => Value::Error,

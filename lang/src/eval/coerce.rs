@@ -32,6 +32,7 @@ impl Elaborator<'_> {
             }
             (v @ Value::Bool(_), Type::Bool)
             | (v @ Value::Text(_), Type::Text)
+            | (v @ Value::Place(_), Type::Place)
             | (v @ Value::Species(_), Type::Species)
             | (v @ Value::Reaction(_), Type::Reaction)
             | (v @ Value::Material(_), Type::Material { .. })
@@ -58,6 +59,12 @@ impl Elaborator<'_> {
             }
             // One thing is a list of one.
             (value @ (Value::Instance(_) | Value::Qualified(..)), Type::List(inner)) => {
+                match self.coerce(value, inner, span, what) {
+                    Value::Error => Value::Error,
+                    one => Value::List(vec![one]),
+                }
+            }
+            (value @ Value::Num(_), Type::List(inner)) if matches!(**inner, Type::Quantity { .. } | Type::Int) => {
                 match self.coerce(value, inner, span, what) {
                     Value::Error => Value::Error,
                     one => Value::List(vec![one]),

@@ -293,6 +293,16 @@ impl<'a> Elaborator<'a> {
                 }
                 v
             }
+            ItemKind::Table { rows, .. } => {
+                self.tables_used.insert(id);
+                match rows {
+                    Some(table) => {
+                        self.spend_on_items(table.rows.len());
+                        Value::List((0..table.rows.len() as u32).map(|row| Value::Row(id, row)).collect())
+                    }
+                    None => Value::Error,
+                }
+            }
             ItemKind::Species { .. } => self.tables.species.of_decl(id).map_or(Value::Error, Value::Species),
             ItemKind::Reaction { name, .. } => {
                 let position =
@@ -345,6 +355,7 @@ impl<'a> Elaborator<'a> {
             matches!(
                 k,
                 ItemKind::Const { .. }
+                    | ItemKind::Table { .. }
                     | ItemKind::Species { .. }
                     | ItemKind::Fn { .. }
                     | ItemKind::Solution { .. }

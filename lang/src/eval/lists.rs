@@ -110,6 +110,8 @@ impl Elaborator<'_> {
                 [one] => self.spoken(one),
                 [first, .., last] => Some(format!("{} .. {}", self.spoken(first)?, self.spoken(last)?)),
             },
+            Value::Place(place) => Some(place.text.clone()),
+            Value::Row(table, row) => self.row_name(*table, *row),
             Value::Tuple(items) if !items.is_empty() => {
                 let names: Option<Vec<String>> = items.iter().map(|i| self.spoken(i)).collect();
                 names.map(|names| format!("({})", names.join(", ")))

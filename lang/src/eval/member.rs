@@ -55,7 +55,11 @@ impl<'a> Elaborator<'a> {
                     self.member(children, name)
                 }
             },
-            Value::List(items) => self.list_member(items, name),
+            Value::Row(table, row) => self.cell(table, row, name),
+            Value::List(items) => match self.column_of(&items, name) {
+                Some(column) => column,
+                None => self.list_member(items, name),
+            },
             Value::Tuple(items) if items.len() == 2 => match name.text.as_str() {
                 "first" => items[0].clone(),
                 "second" => items[1].clone(),
@@ -565,6 +569,13 @@ impl<'a> Elaborator<'a> {
         if let Some(Value::Error) = scope.var(&word.text) {
             return Value::Error;
         }
+        // A place goes before a local of the same name.
+        let local = scope.var(&word.text).filter(|_| !self.is_place(&base, &word.text)).cloned();
+        if let Some(local) = local
+            && self.grid_of(&base).is_some()
+        {
+            return self.grid_at(&base, local, word.span);
+        }
         if let Some(found) = self.grid_index(&base, word, None) {
             return found;
         }
@@ -658,6 +669,9 @@ impl<'a> Elaborator<'a> {
                 return Some(n.clone());
             }
             let v = this.expr(e, scope);
+            if let Value::Place(name) = v {
+                return Some(name);
+            }
             match this.coerce(v, &Type::ratio(), e.span, "place") {
                 Value::Num(n) => {
                     let number = this.graph.constant(n.node).map_or_else(|| "?".into(), |v| v.to_string());
@@ -666,13 +680,12 @@ impl<'a> Elaborator<'a> {
                 _ => None,
             }
         };
-        let (from, to) = match &*index.kind {
-            ExprKind::Range(a, b) => (place(self, a), Some(place(self, b))),
-            _ => (place(self, index), None),
+        let ExprKind::Range(from, to) = &*index.kind else {
+            let at = self.expr(index, scope);
+            return self.grid_at(&base, at, index.span);
         };
-        match (from, to) {
-            (Some(from), None) => self.grid_index(&base, &from, None).unwrap_or(Value::Error),
-            (Some(from), Some(Some(to))) => self.grid_index(&base, &from, Some(&to)).unwrap_or(Value::Error),
+        match (place(self, from), place(self, to)) {
+            (Some(from), Some(to)) => self.grid_index(&base, &from, Some(&to)).unwrap_or(Value::Error),
             _ => Value::Error,
         }
     }

@@ -19,6 +19,7 @@ mod measures;
 pub mod member;
 mod notes;
 pub mod reaction;
+mod rows;
 mod table;
 mod texts;
 mod tilting;
@@ -28,6 +29,8 @@ pub mod words;
 use std::cell::Cell;
 
 use matterix_ir::scene::InstanceId;
+
+use crate::declare::Type;
 
 pub use lab::Elaborator;
 pub use tilting::Tilts;
@@ -46,6 +49,8 @@ pub struct Scope {
     pub lab: bool,
     /// Local names, innermost last.
     pub vars: Vec<(String, Value)>,
+    /// Which of them later steps may change, by position, with their types.
+    pub variables: Vec<(usize, Type)>,
     /// Which of them were read, by position: a bit each, the last one for all that are further in.
     pub reads: Cell<u64>,
 }
@@ -84,8 +89,23 @@ impl Scope {
         self.reads.set(self.reads.get() | inner.reads.get() & own);
     }
 
+    /// Lets later steps change the innermost local.
+    pub fn vary(&mut self, ty: Type) {
+        self.variables.push((self.vars.len() - 1, ty));
+    }
+
+    /// The position and type of the innermost local with this name, if later steps may change it.
+    pub fn variable(&self, name: &str) -> Option<(usize, Type)> {
+        let at = self.vars.iter().rposition(|(n, _)| n == name)?;
+        self.variables.iter().find(|(position, _)| *position == at).cloned()
+    }
+
     /// Adds a local.
     pub fn bind(&mut self, name: impl Into<String>, value: Value) {
+        let depth = self.vars.len();
+        while self.variables.last().is_some_and(|(position, _)| *position >= depth) {
+            self.variables.pop();
+        }
         self.vars.push((name.into(), value));
     }
 }

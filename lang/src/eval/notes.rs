@@ -84,6 +84,7 @@ impl Elaborator<'_> {
             Value::Num(n) => Sort::Quantity(n.dimension.clone(), n.point),
             Value::Bool(_) => Sort::Truth,
             Value::Text(_) => Sort::Text,
+            Value::Place(_) | Value::Row(..) => Sort::Any,
             Value::Enum(_, words) => Sort::Word(words.clone()),
             Value::Range(low, _) => Sort::Range(Box::new(Sort::Quantity(low.dimension.clone(), low.point))),
             Value::Tuple(items) => Sort::Tuple(all(items)),

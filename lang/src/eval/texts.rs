@@ -92,6 +92,7 @@ impl<'a> Elaborator<'a> {
                 out.push(plain(&self.instances[i.0 as usize].name));
             }
             Value::Text(text) => out.push(plain(&text)),
+            Value::Place(place) => out.push(plain(&place.text)),
             Value::Nothing => out.push(plain("nothing")),
             Value::Unlimited => out.push(plain("unlimited")),
             Value::Species(s) => out.push(plain(&self.tables.species.get(s).name)),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Unit};
 
+use crate::ast::Name;
 use crate::declare::{ReactionId, SpeciesId};
 use crate::names::DeclId;
 use crate::units::Dimension;
@@ -37,6 +38,10 @@ pub enum Value {
     Text(String),
     /// One of some words, by its index.
     Enum(NodeId, Arc<[String]>),
+    /// The name of a place of a grid, and where it is written.
+    Place(Name),
+    /// A row of a table, by its number.
+    Row(DeclId, u32),
     /// `a .. b`, closed.
     Range(Box<Num>, Box<Num>),
     /// `(a, b, c)`.
@@ -93,6 +98,8 @@ impl Value {
             Value::Num(_) => "a quantity",
             Value::Bool(_) => "a truth value",
             Value::Text(_) => "a text",
+            Value::Place(_) => "a place",
+            Value::Row(..) => "a row of a table",
             Value::Enum(..) => "a word",
             Value::Range(..) => "a range",
             Value::Tuple(_) => "a tuple",

@@ -10,6 +10,7 @@ use crate::ast::{Binary, Expr, ExprKind, MemberKind, Name};
 use crate::declare::Type;
 use crate::declare::types::list;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::grids::Place;
 use crate::near;
 
 impl<'a> Elaborator<'a> {
@@ -23,6 +24,10 @@ impl<'a> Elaborator<'a> {
     pub fn hinted(&mut self, e: &'a Expr, ty: &Type, scope: &mut Scope) -> Value {
         match (ty, &*e.kind) {
             (Type::Enum(words), _) => self.word(e, words, scope),
+            (Type::Place, ExprKind::Text(text)) => Value::Place(Name { text: text.clone(), span: e.span }),
+            (Type::Place, ExprKind::Name(n)) if Place::parse(&n.text).is_some() && scope.var(&n.text).is_none() => {
+                Value::Place(n.clone())
+            }
             (Type::List(inner), ExprKind::List(items)) if matches!(**inner, Type::Enum(_)) => {
                 Value::List(items.iter().map(|i| self.hinted(i, inner, scope)).collect())
             }

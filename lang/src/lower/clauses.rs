@@ -73,6 +73,8 @@ fn hash_into(value: &Value, hasher: &mut FxHasher) {
         Value::Range(from, to) => (from.node, to.node).hash(hasher),
         Value::Instance(i) | Value::Qualified(i, _) | Value::Grid(i, _) => i.hash(hasher),
         Value::Species(s) | Value::Concentration(_, s) => s.hash(hasher),
+        Value::Row(_, row) => row.hash(hasher),
+        Value::Place(place) => place.text.hash(hasher),
         Value::Text(text) | Value::Included(text) | Value::Frame(_, text) => text.hash(hasher),
         Value::Tuple(values) | Value::List(values) => values.iter().for_each(|v| hash_into(v, hasher)),
         _ => {}

@@ -12,6 +12,7 @@ pub mod roles;
 pub mod script;
 mod stmt;
 mod text;
+mod variables;
 pub mod wires;
 
 pub use crate::declare::failures::FAILURES;
@@ -27,6 +28,7 @@ use matterix_ir::{Sources, Span, Unit};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use self::clauses::Clauses;
+use self::variables::Undecided;
 use crate::ast::{Block, Clause, Handlers, ItemKind};
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
@@ -69,6 +71,8 @@ pub struct Planner<'a, 'e> {
     turns: u64,
     /// Positions of the workflow's parameters.
     parameters: u64,
+    /// Blocks around, innermost last, that only the run decides about.
+    barriers: Vec<variables::Barrier>,
     /// What the call that is being written out says of its sources.
     pub said: Vec<Condition>,
     /// Only what the plan moves where is asked for, not how it reads or what it needs.
@@ -111,6 +115,7 @@ pub struct ResultSlot {
 /// Ends the names declared since `depth`, but for those of steps.
 pub fn leave(scope: &mut Scope, depth: usize) {
     let inner = scope.vars.split_off(depth);
+    scope.variables.retain(|(position, _)| *position < depth);
     scope.vars.extend(inner.into_iter().filter(|(_, v)| matches!(v, Value::Step(..))));
 }
 
@@ -134,6 +139,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             columns: BTreeSet::new(),
             turns: 0,
             parameters: 0,
+            barriers: Vec::new(),
             said: Vec::new(),
             draft: false,
             of_no_use: &|| false,
@@ -212,6 +218,7 @@ impl<'a, 'e> Planner<'a, 'e> {
         let wiring = self.wired();
         self.lab.offers = self.offers;
         self.lab.drivers = self.drivers.into_iter().map(|(_, driver)| driver).collect();
+        arguments.extend(self.lab.data_used());
         let plan = Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends };
         (plan, wiring)
     }
@@ -263,8 +270,10 @@ impl<'a, 'e> Planner<'a, 'e> {
     /// A block as a sequence. Names end with it, but for those of its steps: `grow.end` is asked for afterwards.
     pub fn block(&mut self, block: &'a Block, scope: &mut Scope) -> StepId {
         let depth = scope.vars.len();
+        let turns = self.turns;
         let steps = self.statements(block, scope);
         leave(scope, depth);
+        self.turns = turns;
         self.add("sequence", block.span, Step::Sequence(steps))
     }
 
@@ -282,7 +291,15 @@ impl<'a, 'e> Planner<'a, 'e> {
         handlers: &'a Handlers,
         scope: &mut Scope,
     ) -> StepId {
-        let inner = self.block(body, scope);
+        let inner = self.handled(body, handlers, scope);
         self.with_handlers(label, span, inner, handlers, scope)
+    }
+
+    /// A block with its failure handlers, if it has any, before these.
+    pub(super) fn handled(&mut self, body: &'a Block, handlers: &'a Handlers, scope: &mut Scope) -> StepId {
+        if handlers.on.is_empty() && handlers.finally.is_none() {
+            return self.block(body, scope);
+        }
+        self.undecided(Undecided::Guarded, body.span, scope, |plan, scope| plan.block(body, scope))
     }
 }

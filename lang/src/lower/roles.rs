@@ -4,8 +4,10 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, codes};
 
 use super::Planner;
-use crate::ast::{Expr, Param};
+use super::variables::Decided;
+use crate::ast::{Binary, Expr, ExprKind, Param};
 use crate::declare::Type;
+use crate::eval::lab::free::Bound;
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 
@@ -75,6 +77,42 @@ impl<'a> Planner<'a, '_> {
         let d = Diagnostic::error(codes::UNBOUND_ROLE, span, headline, "does not fit");
         self.lab.report(d.because(condition.span, "required here"));
         Value::Error
+    }
+
+    /// Checks the value of a parameter that is no thing, which was bound last, against what it may be.
+    pub fn check_allowed(&mut self, p: &'a Param, span: matterix_ir::Span, scope: &mut Scope) {
+        let Some(condition) = condition_of(p) else { return };
+        let name = &p.name.text;
+        let value = match scope.vars.last() {
+            Some((_, Value::Error | Value::Instance(_) | Value::Qualified(..) | Value::Nothing)) | None => return,
+            Some((_, value)) => value.clone(),
+        };
+        // A study keeps to it as well.
+        if let (ExprKind::Binary(Binary::In, _, allowed), Value::Num(n)) = (&*condition.kind, &value)
+            && matches!(&*allowed.kind, ExprKind::Range(..))
+            && let Value::Range(low, high) = self.lab.expr(allowed, scope)
+            && let (Some(low), Some(high)) = (self.lab.glance(low.node), self.lab.glance(high.node))
+        {
+            let op = self.lab.graph.op(n.node);
+            self.lab.open.bound(op, Bound::AtLeast, low);
+            self.lab.open.bound(op, Bound::AtMost, high);
+        }
+        let Some(found) = self.condition(condition, scope) else { return };
+        if matches!(self.decided(found.node), Decided::Now(0.0)) {
+            let is = match &value {
+                Value::Num(n) => self.lab.glance(n.node).map(|v| format!("is {}", self.lab.unit_of(n).show(v))),
+                Value::Text(text) => Some(format!("is \"{text}\"")),
+                _ => None,
+            };
+            let is = is.unwrap_or_else(|| "is not allowed".to_owned());
+            let allowed = match &*condition.kind {
+                ExprKind::Binary(Binary::In, _, allowed) => format!("must be in `{}`", self.text(allowed.span)),
+                _ => format!("`{}` must hold", self.text(condition.span)),
+            };
+            let headline = format!("`{name}` {is}, and {allowed}");
+            let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "not allowed");
+            self.lab.report(d.because(condition.span, "required here"));
+        }
     }
 
     /// Every asset of the lab, with why it cannot take a role.

@@ -7,6 +7,7 @@ use matterix_ir::plan::{Caught, Step, StepId};
 use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
+use super::variables::Undecided;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
 use crate::declare::Type;
 use crate::eval::lab::choices::Choice;
@@ -35,6 +36,8 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Error => return None,
             StmtKind::Call(call) => return self.call(call, s.span, scope).map(|c| c.0),
             StmtKind::Let { name, ty, value } => return self.bind(name, ty.as_ref(), value, s.span, scope),
+            StmtKind::Var { name, ty, value } => return self.variable(name, ty.as_ref(), value, s.span, scope),
+            StmtKind::Set { name, op, value } => return self.set(name, *op, value, s.span, scope),
             StmtKind::LetDo { name, call } => {
                 let Some((step, value)) = self.call(call, s.span, scope) else {
                     // What is wrong with the call has been said; the name is there all the same.
@@ -77,7 +80,7 @@ impl<'a> Planner<'a, '_> {
                 let start = self.local(format!("{}.start", name.text), seconds.clone());
                 let end = self.local(format!("{}.end", name.text), seconds);
                 scope.bind(name.text.clone(), Value::Step(start, end));
-                let inner = self.block(body, scope);
+                let inner = self.handled(body, handlers, scope);
                 let named = Step::Named { name: name.text.clone(), start, end, body: inner };
                 let id = self.add(format!("step {}", name.text), s.span, named);
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
@@ -98,14 +101,14 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::Keep { cond, body, handlers } => {
                 let condition = self.deciding(cond, scope)?;
-                let body = self.block(body, scope);
+                let body = self.handled(body, handlers, scope);
                 let id = self.add(label.clone(), s.span, Step::Keep { condition, body });
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::Within { limit, since, body, handlers } => {
                 let limit = self.duration_node(limit, scope, "within")?;
                 let since = self.duration_node(since, scope, "after")?;
-                let body = self.block(body, scope);
+                let body = self.handled(body, handlers, scope);
                 let id = self.add(label.clone(), s.span, Step::Within { limit, since, body });
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
@@ -128,13 +131,22 @@ impl<'a> Planner<'a, '_> {
                     let chosen = if truth != 0.0 { Some(then) } else { otherwise.as_ref() };
                     return chosen.map(|block| self.block(block, scope));
                 }
-                let then = self.block(then, scope);
-                let otherwise = otherwise.as_ref().map(|b| self.block(b, scope));
+                if let Some(chosen) = self.chosen_branch(condition.node, then, otherwise.as_ref(), scope) {
+                    return chosen;
+                }
+                let (then, otherwise) = self.undecided(Undecided::Branch, cond.span, scope, |plan, scope| {
+                    (plan.block(then, scope), otherwise.as_ref().map(|b| plan.block(b, scope)))
+                });
                 Step::If { condition, then, otherwise }
             }
             StmtKind::Repeat { times, body } => {
+                let at = times.span;
                 let times = self.count(times, scope)?;
-                Step::Repeat { times, body: self.block(body, scope) }
+                if let Some(turns) = self.turns(times, body, s.span, scope) {
+                    return Some(turns);
+                }
+                let body = self.undecided(Undecided::Loop, at, scope, |plan, scope| plan.block(body, scope));
+                Step::Repeat { times, body }
             }
             StmtKind::RepeatWhile { cond, max, body } => {
                 let condition = self.deciding(cond, scope)?;
@@ -146,7 +158,8 @@ impl<'a> Planner<'a, '_> {
                     return None;
                 };
                 let max = self.count(max, scope)?;
-                Step::RepeatWhile { condition, max, body: self.block(body, scope) }
+                let body = self.undecided(Undecided::Loop, cond.span, scope, |plan, scope| plan.block(body, scope));
+                Step::RepeatWhile { condition, max, body }
             }
             StmtKind::For { var, set, body } => {
                 let items = match self.lab.set(set, scope) {
@@ -161,10 +174,14 @@ impl<'a> Planner<'a, '_> {
                 for item in items {
                     let depth = scope.vars.len();
                     let shown = self.lab.spoken(&item);
+                    let row = self.lab.row_span(&item);
                     scope.bind(var.text.clone(), item);
                     let turn = self.block(body, scope);
                     if let Some(shown) = shown {
                         self.steps[turn.0 as usize].label = format!("{} = {shown}", var.text);
+                    }
+                    if let Some(row) = row {
+                        self.lab.rows.insert(turn, row);
                     }
                     turns.push(turn);
                     // A step of a turn is that turn's own.
@@ -174,7 +191,9 @@ impl<'a> Planner<'a, '_> {
                 Step::Sequence(turns)
             }
             StmtKind::Try { alternatives, handlers } => {
-                let steps = alternatives.iter().map(|b| self.block(b, scope)).collect();
+                let steps = self.undecided(Undecided::Alternative, head(s), scope, |plan, scope| {
+                    alternatives.iter().map(|b| plan.block(b, scope)).collect()
+                });
                 let id = self.add("try", s.span, Step::Try(steps));
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
@@ -208,14 +227,15 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Sequence { body, handlers } => return Some(self.guarded(&label, s.span, body, handlers, scope)),
             StmtKind::Parallel { body, handlers } => {
                 let depth = scope.vars.len();
-                let branches = self.statements(body, scope);
+                let branches =
+                    self.undecided(Undecided::Parallel, head(s), scope, |plan, scope| plan.statements(body, scope));
                 super::leave(scope, depth);
                 let id = self.add("parallel", s.span, Step::Parallel(branches));
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::Start { name, body } => {
                 self.jobs.insert(name.text.clone());
-                let body = self.block(body, scope);
+                let body = self.undecided(Undecided::Job, head(s), scope, |plan, scope| plan.block(body, scope));
                 Step::Start { job: name.text.clone(), body }
             }
             StmtKind::Await { name } => {
@@ -293,12 +313,16 @@ impl<'a> Planner<'a, '_> {
                 self.lab.report(d.because(first.span, "this handler takes it"));
             }
             self.handlers += 1;
-            let step = self.block(block, scope);
+            let step = self.undecided(Undecided::Handler, name.span, scope, |plan, scope| plan.block(block, scope));
             self.handlers -= 1;
             let which = if name.text == "failure" { Caught::Any } else { Caught::Named(name.text.clone()) };
             caught.push((which, step));
         }
-        let finally = handlers.finally.as_ref().map(|b| self.block(b, scope));
+        let finally = handlers.finally.as_ref().map(|b| {
+            self.undecided(Undecided::Handler, Span { end: b.span.start, ..b.span }, scope, |plan, scope| {
+                plan.block(b, scope)
+            })
+        });
         self.add(label, span, Step::Guarded { body, handlers: caught, finally })
     }
 
@@ -377,7 +401,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// `let x = e`: a value that depends on the run is taken now and kept.
-    fn bind(
+    pub(super) fn bind(
         &mut self,
         name: &Name,
         ty: Option<&'a crate::ast::Type>,
@@ -386,13 +410,19 @@ impl<'a> Planner<'a, '_> {
         scope: &mut Scope,
     ) -> Option<StepId> {
         let ty = ty.map_or(Type::Any, |ty| self.lab.resolve_type(ty, scope.module));
+        let seen = scope.reads.replace(0);
         let mut v = self.lab.typed(value, &ty, scope, &name.text);
+        let read = scope.reads.replace(scope.reads.get() | seen);
         if let Value::Concentration(..) = v {
             self.lab.kindless(value.span);
             v = Value::Error;
         }
         self.unshadowed(name, scope);
         let (kept, steps) = self.keep(&name.text, v, span);
+        // What follows from a turn's thing is that turn's own.
+        if read & self.turns != 0 {
+            self.turns |= Scope::read_bit(scope.vars.len());
+        }
         scope.bind(name.text.clone(), kept);
         match steps.as_slice() {
             [] => None,
@@ -636,6 +666,7 @@ impl<'a> Planner<'a, '_> {
                 other => other,
             };
             scope.bind(p.name.text.clone(), v);
+            self.check_allowed(p, span, scope);
         }
         shown
     }

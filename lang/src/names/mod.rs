@@ -101,6 +101,7 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         | ItemKind::Relation { name, .. }
         | ItemKind::Fn { name, .. }
         | ItemKind::Const { name, .. }
+        | ItemKind::Table { name, .. }
         | ItemKind::Framing { name, .. }
         | ItemKind::Driver { name, .. }
         | ItemKind::Lab { name, .. }

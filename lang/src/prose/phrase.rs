@@ -205,6 +205,9 @@ impl<'a> Prose<'a, '_> {
     /// `plate[A1]` is a well, `beaker[EtOH]` a concentration.
     fn indexed(&mut self, base: &'a Expr, word: &Name) -> String {
         let value = self.value(base);
+        if self.vars.contains(&word.text) && !self.lab.is_place(&value, &word.text) {
+            return format!("value number _{}_ (from 0) of {}", words::plain(&word.text), self.say(base));
+        }
         if self.lab.grid_of(&value).is_some() {
             return format!("{} of {}", word.text, self.say(base));
         }

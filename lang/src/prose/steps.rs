@@ -2,7 +2,7 @@
 
 use super::list::{Group, List, Step};
 use super::{Prose, words};
-use crate::ast::{Binary, Block, Expr, ExprKind, Handlers, Stmt, StmtKind};
+use crate::ast::{AssignOp, Binary, Block, Expr, ExprKind, Handlers, Stmt, StmtKind};
 use crate::eval::Value;
 use matterix_ir::listing::joined;
 
@@ -79,6 +79,19 @@ impl<'a> Prose<'a, '_> {
                 let text = format!("Write down {} as _{}_.", self.say(value), words::plain(&name.text));
                 self.vars.push(name.text.clone());
                 Step::new(text)
+            }
+            StmtKind::Var { name, value, .. } => {
+                let text = format!("Begin with _{}_ at {}.", words::plain(&name.text), self.say(value));
+                self.vars.push(name.text.clone());
+                Step::new(text)
+            }
+            StmtKind::Set { name, op, value } => {
+                let (name, value) = (words::plain(&name.text), self.say(value));
+                Step::new(match op {
+                    AssignOp::Set => format!("From here on, _{name}_ is {value}."),
+                    AssignOp::Add => format!("Add {value} to _{name}_."),
+                    AssignOp::Sub => format!("Subtract {value} from _{name}_."),
+                })
             }
             StmtKind::LetDo { name, call } => {
                 let mut step = self.call(call);

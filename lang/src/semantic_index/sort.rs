@@ -71,6 +71,7 @@ impl Sort {
             Type::Int => Sort::number(),
             Type::Bool => Sort::Truth,
             Type::Text => Sort::Text,
+            Type::Place => Sort::Any,
             Type::Enum(words) => Sort::Word(words.clone()),
             Type::Species => Sort::Species,
             Type::Reaction => Sort::Reaction,

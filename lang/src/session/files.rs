@@ -11,6 +11,7 @@ use super::Session;
 use crate::import;
 use crate::loader::Loader;
 use crate::names::Module;
+use crate::sheet;
 use crate::units::Units;
 
 /// So many modules are kept.
@@ -76,6 +77,20 @@ pub(crate) fn features(
 ) -> Vec<Diagnostic> {
     let noting = Noting { loader, asked: RefCell::default() };
     let found = import::features(&mut module.tree, module.file, units, sources, &noting);
+    session.beside = figure(&(session.beside, noting.asked.into_inner()));
+    found
+}
+
+/// Reads the tables of a module; what is wrong with those.
+pub(crate) fn tables(
+    session: &mut Session,
+    module: &mut Module,
+    units: &Units,
+    sources: &mut Sources,
+    loader: &dyn Loader,
+) -> Vec<Diagnostic> {
+    let noting = Noting { loader, asked: RefCell::default() };
+    let found = sheet::read(&mut module.tree, module.file, units, sources, &noting);
     session.beside = figure(&(session.beside, noting.asked.into_inner()));
     found
 }

@@ -60,6 +60,7 @@ impl Sort {
                 }
             }
             ItemKind::Const { .. }
+            | ItemKind::Table { .. }
             | ItemKind::Fn { .. }
             | ItemKind::Relation { .. }
             | ItemKind::Skill { .. }

@@ -19,7 +19,7 @@ use crate::{ast, library};
 pub use foreseen::Foreseen;
 
 pub(crate) use closure::Words;
-pub(crate) use files::{features, imported};
+pub(crate) use files::{features, imported, tables};
 pub(crate) use verdicts::{CachedAnalysis, Environment, Snapshot, TaskKey, number};
 
 /// How many packages are remembered: those that are worked on at the same time.

@@ -256,6 +256,17 @@ pub enum ItemKind {
         /// Its value.
         value: Expr,
     },
+    /// `table plan from csv "plan.csv" { well: Place, volume: Volume as uL }`.
+    Table {
+        /// Its name.
+        name: Name,
+        /// The format and the file after `from`.
+        source: (Name, Name),
+        /// Its columns.
+        columns: Vec<Column>,
+        /// What the file holds: nothing before it is read, or where it cannot be.
+        rows: Option<Box<TableRows>>,
+    },
     /// `framing stx { carries: text, frame: "\x02{data}\x03" }`.
     Framing {
         /// Its name.
@@ -340,6 +351,43 @@ pub enum ItemKind {
         /// Failure handlers and `finally`.
         handlers: Handlers,
     },
+}
+
+/// `volume "Transfer volume": Volume as uL = 0 uL`: a column of a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Column {
+    /// Its name.
+    pub name: Name,
+    /// What its header in the file says, if that is no name.
+    pub header: Option<Name>,
+    /// Its type.
+    pub ty: Type,
+    /// The unit of bare numbers.
+    pub unit: Option<UnitText>,
+    /// What an empty cell stands for.
+    pub default: Option<Expr>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// What the file of a table holds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TableRows {
+    /// A figure of the whole text of the file, as `sha256sum` gives it.
+    pub sum: String,
+    /// In order.
+    pub rows: Vec<TableRow>,
+}
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TableRow {
+    /// Its line in the file, counted from 1.
+    pub line: u32,
+    /// All of it.
+    pub span: Span,
+    /// A cell for each column; none where it is empty and its column says what that means.
+    pub cells: Vec<Option<Expr>>,
 }
 
 /// `labelled 0.04 mol/kg of KI +- 1 %`.
@@ -1229,6 +1277,24 @@ pub enum StmtKind {
         /// Its type.
         ty: Option<Type>,
         /// Its value.
+        value: Expr,
+    },
+    /// `var n: T = e`: a value that later steps change.
+    Var {
+        /// Its name.
+        name: Name,
+        /// Its type.
+        ty: Option<Type>,
+        /// Its first value.
+        value: Expr,
+    },
+    /// `n += e`, `n -= e`, `n = e`: another value from here on.
+    Set {
+        /// The name of the `var`.
+        name: Name,
+        /// How.
+        op: AssignOp,
+        /// By what.
         value: Expr,
     },
     /// `let m <- weigh v on scale`.

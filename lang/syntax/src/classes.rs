@@ -172,15 +172,15 @@ fn class(rule: Rule, parent: Rule, text: &str, called: bool) -> Option<Class> {
         (workflow | test | verb, ident) => Class::Declared(Declared::Skill),
         (fn_ | relation | process | event | hazard, ident) => Class::Declared(Declared::Function),
         (param | option_param, ident | word) => Class::Declared(Declared::Parameter),
-        (let_ | law_let | for_ | law_for | each | step | start | instance | include, ident) => {
+        (let_ | var_ | law_let | for_ | law_for | each | step | start | instance | include, ident) => {
             Class::Declared(Declared::Variable)
         }
-        (value_member, word) | (frame_member | frame | part_line | grid | joint, ident) => {
+        (value_member, word) | (column, word) | (frame_member | frame | part_line | grid | joint, ident) => {
             Class::Declared(Declared::Member)
         }
         (
-            const_ | dimension | solution | reaction | equilibrium | interaction | reactive_group | material | framing
-            | driver | lab | study | fit,
+            const_ | table | dimension | solution | reaction | equilibrium | interaction | reactive_group | material
+            | framing | driver | lab | study | fit,
             ident,
         ) => Class::Declared(Declared::Other),
         (_, bare_word | returning) => Class::Call,
@@ -189,7 +189,7 @@ fn class(rule: Rule, parent: Rule, text: &str, called: bool) -> Option<Class> {
         (_, species | charged) => Class::Species,
         (path, _) | (_, path) | (use_ | ty, ident) => Class::Type,
         (_, ident) if called => Class::Function,
-        (_, ident | word | well | place | state_word | state_name) => Class::Name,
+        (_, ident | set_name | word | well | place | state_word | state_name) => Class::Name,
         // `and`, `or`, `in`, `is` among the signs.
         (_, rel) if text.starts_with(|c: char| c.is_ascii_alphabetic()) => Class::Keyword,
         _ => return None,

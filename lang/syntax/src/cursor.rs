@@ -131,6 +131,8 @@ fn is_noise(rule: Rule) -> bool {
             | kw_fit
             | kw_test
             | kw_let
+            | kw_table
+            | kw_var
             | kw_wait
             | kw_sequence
             | kw_parallel

@@ -85,6 +85,7 @@ parts! {
     UnitText { text span }
     File { version docs items }
     Item { docs kind span }
+    Column { name header ty unit default span }
     Labelled { value species tolerance span }
     Term { coefficient species span }
     Field { key value span }
@@ -160,6 +161,8 @@ impl Relocate for ItemKind {
                 each!(put: external name params result body options)
             }
             ItemKind::Const { name, ty, value } => each!(put: name ty value),
+            // Its rows stand in another file.
+            ItemKind::Table { name, source, columns, rows: _ } => each!(put: name source columns),
             ItemKind::Framing { name, fields } => each!(put: name fields),
             ItemKind::Driver { name, device, transport, args, wires } => each!(put: name device transport args wires),
             ItemKind::Lab { name, params, lines } => each!(put: name params lines),
@@ -356,6 +359,8 @@ impl Relocate for StmtKind {
         match self {
             StmtKind::Error => {}
             StmtKind::Let { name, ty, value } => each!(put: name ty value),
+            StmtKind::Var { name, ty, value } => each!(put: name ty value),
+            StmtKind::Set { name, op, value } => each!(put: name op value),
             StmtKind::LetDo { name, call } => each!(put: name call),
             StmtKind::Step { name, body, handlers } => each!(put: name body handlers),
             StmtKind::Wait { duration } => each!(put: duration),

@@ -24,6 +24,7 @@ pub(super) const ITEM_WORDS: &[&str] = &[
     "extern",
     "fn",
     "const",
+    "table",
     "framing",
     "driver",
     "lab",

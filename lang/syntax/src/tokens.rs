@@ -117,7 +117,7 @@ fn begins_with(rule: Rule, parent: Rule) -> Begins {
     match (parent, rule) {
         (_, lbrace | rbrace | end | field_end) => Begins::Nothing,
         (block | laws | members | wires | study_body | fit_body, _) => Begins::Line,
-        (fields | fills | options | asset_body | lab_body, _) => Begins::Field,
+        (fields | fills | options | columns | asset_body | lab_body, _) => Begins::Field,
         (clauses, _) => Begins::Clause,
         (handlers, _) | (if_ | try_ | law_if, kw_else) => Begins::Handler,
         (process, kw_while) | (event | hazard, kw_when) => Begins::Guard,

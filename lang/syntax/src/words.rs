@@ -23,13 +23,14 @@ fn describe(rule: Rule) -> Option<&'static str> {
         label | labelled | sig_group => "a preposition",
         named => "an option",
         field => "a field",
+        column => "a column",
+        source => "`from csv`",
         params | lparen => "`(`",
         rparen => "`)`",
         lbracket | index => "`[`",
         rbracket => "`]`",
-        lbrace | block | laws | fields | fills | members | lab_body | wires | study_body | fit_body | asset_body => {
-            "`{`"
-        }
+        lbrace | block | laws | fields | columns | fills | members | lab_body | wires | study_body | fit_body
+        | asset_body => "`{`",
         rbrace => "`}`",
         langle => "`<`",
         comma => "`,`",

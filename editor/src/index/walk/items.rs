@@ -131,6 +131,12 @@ impl Walk<'_> {
                 self.exprs(body);
                 self.member_options(options);
             }
+            ItemKind::Table { columns, .. } => {
+                for column in columns {
+                    self.ty(&column.ty);
+                    self.exprs(&column.default);
+                }
+            }
             ItemKind::Const { ty, value, .. } => {
                 ty.iter().for_each(|t| self.ty(t));
                 let words = self.item.map(|d| self.index.def(d).words.clone()).unwrap_or_default();

@@ -29,7 +29,11 @@ impl Walk<'_> {
     fn stmt(&mut self, s: &Stmt) {
         match &s.kind {
             StmtKind::Error => {}
-            StmtKind::Let { name, ty, value } => {
+            StmtKind::Set { name, value, .. } => {
+                self.name(name, &[]);
+                self.expr(value);
+            }
+            StmtKind::Let { name, ty, value } | StmtKind::Var { name, ty, value } => {
                 if let Some(ty) = ty {
                     self.ty(ty);
                 }

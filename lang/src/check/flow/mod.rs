@@ -177,6 +177,8 @@ struct Interpreter<'l, 'a> {
     rescued: BTreeSet<StepId>,
     /// The user's statements around, innermost last.
     sites: Vec<Site>,
+    /// Rows of tables that the turns around are for, innermost last.
+    rows: Vec<Span>,
     /// Findings are not reported while this is not 0.
     quiet: usize,
     /// While this is not 0 it is open whether the plan gets here: what fails for certain fails on some ways.
@@ -364,6 +366,7 @@ impl<'l, 'a> Interpreter<'l, 'a> {
             succeeded: BTreeSet::new(),
             rescued: BTreeSet::new(),
             sites: Vec::new(),
+            rows: Vec::new(),
             quiet: 0,
             doubt: 0,
             open: 0,

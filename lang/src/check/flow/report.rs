@@ -558,7 +558,10 @@ impl Interpreter<'_, '_> {
         for site in self.sites.iter().rev().skip(1).filter(|s| s.calls).take(2) {
             d = d.because(site.span, format!("in `{}`", site.label));
         }
-        d
+        match self.rows.last() {
+            Some(row) => d.because(*row, "in the turn of this row"),
+            None => d,
+        }
     }
 
     /// What a condition compares, in numbers: `` `a + b` is 600 uL, at most 360 uL``.

@@ -55,7 +55,12 @@ impl<'l> Interpreter<'l, '_> {
         let (began, _) = facts.time.bounds();
         let waits = node.step.waits_for_jobs();
         self.blocks += usize::from(waits);
+        let row = self.lab.rows.get(&id).copied();
+        self.rows.extend(row);
         let mut after = self.step(id, facts);
+        if row.is_some() {
+            self.rows.pop();
+        }
         self.blocks -= usize::from(waits);
         if std::mem::take(&mut self.stopped) {
             after = None;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use matterix_ir::quantity::show_number;
 use matterix_ir::scene::{InstanceId, Pose};
 use matterix_ir::{Diagnostic, Span, codes};
 
@@ -444,6 +445,49 @@ impl<'a> Elaborator<'a> {
             (Some(found), Some(_)) => list(found),
             (Some(found), None) => found.first().map_or(Value::Error, |child| Value::Instance(*child)),
         })
+    }
+
+    /// Whether a grid has a place of this name.
+    pub fn is_place(&self, base: &Value, name: &str) -> bool {
+        let children = self.grid_of(base).map(|(id, grid)| &self.instances[id.0 as usize].grids[grid].children);
+        Place::parse(name).is_some_and(|place| children.is_some_and(|children| children.contains_key(&place)))
+    }
+
+    /// `x[e]` for a grid or an instance that has one, by the value of an expression: the number that a place has; of `plate.wells`, the
+    /// position in this list.
+    pub fn grid_at(&mut self, base: &Value, at: Value, span: Span) -> Value {
+        let Some((id, grid)) = self.grid_of(base) else { return self.expected("a plate or another grid", base, span) };
+        if let Value::Place(name) = &at {
+            let told = self.diagnostics.len();
+            let found = self.grid_index(base, name, None).unwrap_or(Value::Error);
+            if let Some(d) = self.diagnostics[told..].first_mut().filter(|_| name.span != span) {
+                *d = d.clone().because(span, "used here");
+            }
+            return found;
+        }
+        let Value::Num(n) = self.coerce(at, &Type::ratio(), span, "place") else { return Value::Error };
+        if self.prototype && self.stand_in_place(id, grid).is_some() {
+            return self.stand_in_place(id, grid).map_or(Value::Error, Value::Instance);
+        }
+        let Some(number) = self.known(n.node) else {
+            let headline = "a place must be known before the run";
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "depends on the run");
+            self.report(d.help("use a place such as `A1`, a number, or a `var` that counts"));
+            return Value::Error;
+        };
+        let of = &self.instances[id.0 as usize].grids[grid];
+        if !matches!(base, Value::Grid(..)) || !of.lettered() {
+            let name = Name { text: number.to_string(), span };
+            return self.grid_index(base, &name, None).unwrap_or(Value::Error);
+        }
+        let whole = number >= 0.0 && number.fract() == 0.0;
+        if let Some(child) = of.children.values().nth(number as usize).filter(|_| whole) {
+            return Value::Instance(*child);
+        }
+        let (thing, count) = (self.grid_name(id, grid), self.instances[id.0 as usize].grids[grid].children.len());
+        let headline = format!("`{thing}` has {count} places, counted from 0: this is number {}", show_number(number));
+        self.report(Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "out of range (the first is 0)"));
+        Value::Error
     }
 
     /// The grid that a value means.

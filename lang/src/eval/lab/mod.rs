@@ -34,7 +34,7 @@ use std::sync::{Arc, RwLock};
 
 use matterix_ir::equilibrium::{Circle, System, Unsettled};
 use matterix_ir::model;
-use matterix_ir::plan::{Comparison, Term};
+use matterix_ir::plan::{Comparison, StepId, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Graph, Leaves, NodeId, Op, Span};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -288,6 +288,10 @@ pub struct Elaborator<'a> {
     pub calls: Vec<Span>,
     /// Kinds of which the text of the lab or the workflow goes through all instances.
     pub gone_through: BTreeSet<DeclId>,
+    /// Tables that the lab or the plan is made of.
+    pub tables_used: BTreeSet<DeclId>,
+    /// Turns of the plan for rows of a table: where the row stands.
+    pub rows: BTreeMap<StepId, Span>,
     /// What a node that picks an instance may give.
     pub picks: BTreeMap<NodeId, Vec<InstanceId>>,
     /// Values of functions of instances, as far as they were asked for.
@@ -379,6 +383,8 @@ impl<'a> Elaborator<'a> {
             rate_prefix: None,
             calls: Vec::new(),
             gone_through: BTreeSet::new(),
+            tables_used: BTreeSet::new(),
+            rows: BTreeMap::new(),
             picks: BTreeMap::new(),
             known_calls: FxHashMap::default(),
             known_properties: FxHashMap::default(),

@@ -98,6 +98,16 @@ fn item_kind(kind: &ItemKind) -> Sexp {
             .with(result.as_ref().map(|r| node("result").with([ty(r)])))
             .with(body.as_ref().map(expr))
             .with(named(options)),
+        ItemKind::Table { name: word, source: (format, file), columns, .. } => {
+            node("table").with([name(word), name(format), quoted(&file.text)]).with(columns.iter().map(|c| {
+                node("column")
+                    .with([name(&c.name)])
+                    .with(c.header.as_ref().map(|h| quoted(&h.text)))
+                    .with([ty(&c.ty)])
+                    .with(c.unit.as_ref().map(|u| quoted(&u.text)))
+                    .with(c.default.as_ref().map(expr))
+            }))
+        }
         ItemKind::Const { name: word, ty: of, value } => {
             node("const").with([name(word)]).with(of.as_ref().map(ty)).with([expr(value)])
         }

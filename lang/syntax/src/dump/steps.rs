@@ -5,7 +5,7 @@ use super::{
     exprs::{expr, maybe, named, path, ty},
     leaf, name, names, node, quoted,
 };
-use crate::ast::{Block, Call, Expr, Handlers, Name, Stmt, StmtKind, Text, TextPart};
+use crate::ast::{AssignOp, Block, Call, Expr, Handlers, Name, Stmt, StmtKind, Text, TextPart};
 
 pub(super) fn block(block: &Block) -> Sexp {
     node("block").with(block.stmts.iter().map(stmt))
@@ -49,6 +49,17 @@ fn stmt(stmt: &Stmt) -> Sexp {
         StmtKind::Error => leaf("error"),
         StmtKind::Let { name: word, ty: of, value } => {
             node("let").with([name(word)]).with(of.as_ref().map(ty)).with([expr(value)])
+        }
+        StmtKind::Var { name: word, ty: of, value } => {
+            node("var").with([name(word)]).with(of.as_ref().map(ty)).with([expr(value)])
+        }
+        StmtKind::Set { name: word, op, value } => {
+            let op = match op {
+                AssignOp::Set => "set",
+                AssignOp::Add => "add",
+                AssignOp::Sub => "subtract",
+            };
+            node(op).with([name(word), expr(value)])
         }
         StmtKind::LetDo { name: word, call: step } => node("let-do").with([name(word), call(step)]),
         StmtKind::Step { name: word, body, handlers: on } => {

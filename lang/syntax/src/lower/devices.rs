@@ -30,7 +30,7 @@ impl Lower<'_> {
     }
 
     /// `from FORMAT "file"`.
-    fn source_in(&mut self, kids: &mut Kids) -> Option<(Name, Name)> {
+    pub(super) fn source_in(&mut self, kids: &mut Kids) -> Option<(Name, Name)> {
         kids.eat(Rule::source).map(|node| {
             let kids = &mut Kids::of(node);
             let format = self.name_in(kids);

@@ -7,7 +7,9 @@ use super::{
     },
     Lower,
 };
-use crate::ast::{Block, ItemKind, Labelled, UnitText};
+use matterix_ir::Span;
+
+use crate::ast::{Block, Column, ItemKind, Labelled, Type, UnitText};
 
 impl Lower<'_> {
     pub(super) fn item_form(&mut self, node: Node) -> ItemKind {
@@ -100,6 +102,17 @@ impl Lower<'_> {
                 ty: kids.eat(Rule::ty).map(|t| self.ty(t)),
                 value: self.expr_in(kids),
             },
+            Rule::table => {
+                let name = self.name_in(kids);
+                let source = self.source_in(kids).unwrap_or_else(|| (name.clone(), name.clone()));
+                let columns = self.lines(
+                    kids.eat(Rule::columns),
+                    Rule::only_column,
+                    |this, node, span| Some(this.column(node, span)),
+                    |_, _, _| None,
+                );
+                ItemKind::Table { name, source, columns: columns.into_iter().flatten().collect(), rows: None }
+            }
             Rule::driver => self.driver(kids),
             Rule::lab => self.lab(kids),
             Rule::skill => ItemKind::Skill {
@@ -125,6 +138,23 @@ impl Lower<'_> {
             }
             _ => ItemKind::Error,
         }
+    }
+
+    fn column(&mut self, node: Node, span: Span) -> Column {
+        let kids = &mut Kids::of(node);
+        let name = self.name_in(kids);
+        let header = matches!(kids.peek(), Some(Rule::string)).then(|| self.quoted_in(kids));
+        let ty = kids.eat(Rule::ty).map(|t| self.ty(t));
+        let ty = ty.unwrap_or_else(|| Type {
+            paths: Vec::new(),
+            words: Vec::new(),
+            argument: None,
+            optional: false,
+            condition: None,
+            span,
+        });
+        let unit = kids.eat(Rule::as_unit).and_then(|n| Kids::of(n).eat(Rule::unit)).map(|u| self.unit(&u));
+        Column { name, header, ty, unit, default: kids.eat(Rule::cond).map(|d| self.expr(d)), span }
     }
 
     fn test_body(&mut self, kids: &mut Kids) -> Block {

@@ -73,12 +73,7 @@ impl Lower<'_> {
             Rule::law_if => self.law_if(&mut kids),
             _ => {
                 let target = self.expr_in(&mut kids);
-                let Some(op) = kids.eat(Rule::assign) else { return LawKind::Call(target) };
-                let op = match op.as_str() {
-                    "+=" => AssignOp::Add,
-                    "-=" => AssignOp::Sub,
-                    _ => AssignOp::Set,
-                };
+                let Some(op) = assign_op(&mut kids) else { return LawKind::Call(target) };
                 LawKind::Assign { target, op, value: self.expr_in(&mut kids) }
             }
         }
@@ -106,4 +101,13 @@ impl Lower<'_> {
         }
         LawKind::Error
     }
+}
+
+/// How something changes, if that is what stands next.
+pub(super) fn assign_op(kids: &mut Kids) -> Option<AssignOp> {
+    Some(match kids.eat(Rule::assign)?.as_str() {
+        "+=" => AssignOp::Add,
+        "-=" => AssignOp::Sub,
+        _ => AssignOp::Set,
+    })
 }

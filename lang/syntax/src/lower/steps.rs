@@ -10,6 +10,7 @@ use super::{
         spot::meant_step,
     },
     Lower,
+    laws::assign_op,
 };
 use crate::ast::{Block, Call, Expr, ExprKind, Handlers, Name, Path, Stmt, StmtKind};
 
@@ -128,6 +129,16 @@ impl Lower<'_> {
         let kids = &mut Kids::of(node);
         match rule {
             Rule::let_ => self.let_stmt(kids),
+            Rule::var_ => {
+                let name = self.name_in(kids);
+                let ty = kids.eat(Rule::ty).map(|t| self.ty(t));
+                StmtKind::Var { name, ty, value: self.expr_in(kids) }
+            }
+            Rule::set_ => {
+                let name = self.name_in(kids);
+                let Some(op) = assign_op(kids) else { return StmtKind::Error };
+                StmtKind::Set { name, op, value: self.expr_in(kids) }
+            }
             Rule::wait => self.wait(kids),
             Rule::step => {
                 StmtKind::Step { name: self.name_in(kids), body: self.block_in(kids), handlers: self.handlers_in(kids) }

@@ -9,7 +9,7 @@ use super::{
     },
     Lower,
 };
-use crate::ast::{Param, Path, Sig, Type};
+use crate::ast::{Binary, Expr, ExprKind, Param, Path, Sig, Type};
 
 /// The deepest `A<B<C>>`.
 const MAX_ARGUMENTS: usize = 16;
@@ -81,7 +81,14 @@ impl Lower<'_> {
     pub(super) fn param(&mut self, node: Node) -> Param {
         let mut kids = Kids::of(node);
         let name = self.name_in(&mut kids);
-        let ty = kids.eat(Rule::ty).map(|t| self.ty(t));
+        let mut ty = kids.eat(Rule::ty).map(|t| self.ty(t));
+        if let (Some(Rule::operand), Some(ty)) = (kids.peek(), &mut ty) {
+            // `n: Int in 1 .. 96` is `n: Int where n in 1 .. 96`.
+            let allowed = self.expr_in(&mut kids);
+            let span = name.span.to(allowed.span);
+            let value = Expr { kind: Box::new(ExprKind::Name(name.clone())), span: name.span };
+            ty.condition.get_or_insert(Expr { kind: Box::new(ExprKind::Binary(Binary::In, value, allowed)), span });
+        }
         let of = kids.has(Rule::kw_of).then(|| self.name_in(&mut kids));
         let default = kids.eat(Rule::cond).map(|c| self.expr(c));
         Param { name, ty, of, default }
