@@ -157,7 +157,7 @@ module.exports = grammar({
       seq(
         field('name', $._name), repeat(seq('&', field('name', $._name))),
         optional(seq($.type_arguments, repeat(seq('&', field('name', $._name))))), optional('?'),
-        optional(seq('where', field('condition', $.expression))),
+        optional(choice(seq('where', field('condition', $.expression)), seq('in', nl($), field('allowed', $._operand)))),
       ),
     ),
     _words_type: ($) => seq($._type_word, repeat1(seq('|', nl($), $._type_word))),
@@ -165,8 +165,7 @@ module.exports = grammar({
     type_arguments: ($) => seq('<', $._name, repeat(seq('&', $._name)), optional($.type_arguments), '>'),
     parameters: ($) => seq('(', nl($), optional(listed($, $.parameter)), ')'),
     parameter: ($) => seq(
-      field('name', $.identifier), optional(seq(':', nl($), field('type', $.type), optional(seq('in', nl($), field('allowed', $._operand))))),
-      optional(seq('of', nl($), field('of', $.identifier))),
+      field('name', $.identifier), optional(seq(':', nl($), field('type', $.type))), optional(seq('of', nl($), field('of', $.identifier))),
       optional(seq('=', nl($), field('default', $.expression))),
     ),
     _signature: ($) => signature_of($, $.verb),
@@ -292,10 +291,12 @@ module.exports = grammar({
     table: ($) => seq('table', field('name', $.identifier), $.source, field('body', $.columns)),
     columns: ($) => fields_of($, $.column),
     column: ($) => seq(
-      field('name', alias($._any_word, $.field_name)), optional(field('header', $.string)), ':', nl($), field('type', $.type),
+      field('name', alias($._any_word, $.field_name)), optional(field('header', $.string)), ':', nl($),
+      field('type', alias($._column_type, $.type)),
       optional(seq('as', nl($), field('unit', alias($._unit_after_as, $.unit)))),
       optional(seq('=', nl($), field('default', $.expression))),
     ),
+    _column_type: ($) => choice($._words_type, seq(field('name', $._name), optional($.type_arguments), optional('?'))),
     use: ($) => seq('use', field('path', $._name), optional(seq(
       choice('::', token.immediate('::')), '{', nl($), listed($, $.identifier), '}',
     ))),
