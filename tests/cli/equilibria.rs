@@ -33,7 +33,7 @@ fn constants_are_written_in_one_way_at_a_time() {
         ("analytic: [-14], enthalpy: 55 kJ/mol", "unknown-field", "`enthalpy` follows from `analytic`"),
         ("analytic: [-14], at: 20 degC", "unknown-field", "`at` follows from `analytic`"),
         ("analytic: [-14], log_constant: -14", "unknown-field", "has two constants"),
-        ("analytic: -14", "", "analytic"),
+        ("analytic: 20 degC", "", "analytic"),
     ];
     for (constant, code, why) in wrong {
         let text = cup(&format!("equilibrium w: water <-> H+ + OH- {{ {constant} }}"), "100 g of water", "");

@@ -37,6 +37,10 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     for (index, time) in instants(run, &replay, tints.values()).into_iter().enumerate() {
         let travelled = robots.until(run, time, sink, frames, &mut replay)?;
         let moved = replay.sample(run, time) || index == 0;
+        // What is let go as the last motion ends is told by no motion after it.
+        if moved {
+            robots.loaded(run, time, sink, &mut replay)?;
+        }
         if !moved && !travelled && tints.is_empty() {
             continue;
         }

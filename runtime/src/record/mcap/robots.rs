@@ -120,16 +120,28 @@ impl Robots {
             self.burdens(run, moment.time, sink)?;
             self.write(moment, sink, frames)?;
             travelled = true;
-            for (robot, items) in replay.loads() {
-                let name = |id: &InstanceId| run.program.scene.get(*id).name.as_str();
-                let load = bodies::Grip { robot: name(&robot), items: items.iter().map(name).collect() };
-                sink.push(self.loads, moment.time, &load)?;
-            }
+            self.loaded(run, moment.time, sink, replay)?;
             places(run, moment.time, replay.along(moment.robot), sink, frames)?;
         }
         travelled |= self.sightings(run, time, sink, frames, replay)?;
         self.burdens(run, time, sink)?;
         Ok(travelled)
+    }
+
+    /// Writes what robots take along from a time on, s, where that has changed.
+    pub(super) fn loaded<W: Write + Seek>(
+        &self,
+        run: &Run<'_>,
+        time: f64,
+        sink: &mut Sink<W>,
+        replay: &mut Replay<'_>,
+    ) -> McapResult<()> {
+        for (robot, items) in replay.loads() {
+            let name = |id: &InstanceId| run.program.scene.get(*id).name.as_str();
+            let load = bodies::Grip { robot: name(&robot), items: items.iter().map(name).collect() };
+            sink.push(self.loads, time, &load)?;
+        }
+        Ok(())
     }
 
     /// Writes where loose things have moved up to a time, s; whether any have.
