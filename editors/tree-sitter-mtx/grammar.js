@@ -51,7 +51,7 @@ module.exports = grammar({
 
   externals: ($) => [
     $._newline, $._blank_line, $._nl_clause, $._nl_more,
-    $._unit, $._unit_after_as, $.state_word, $._first_word, $._next_word, $._species, $._species_argument, $._species_index, $._species_value, $._less,
+    $._unit, $._unit_after_as, $.state_word, $._first_word, $._next_word, $._species, $._species_index, $._species_ion, $._less,
     $._tight, $._same_line, $._beside, $._error_sentinel,
   ],
 
@@ -98,7 +98,7 @@ module.exports = grammar({
     _string_content: () => token.immediate(prec(1, /[^"\\\n{}]+|[{}]/)),
     // In texts that are shown: `{vessel.temperature as degC :.1}`.
     placeholder: () => token.immediate(prec(2, /\{[^{}"\\\n]+\}/)),
-    escape_sequence: () => token.immediate(prec(1, choice(/\\[nrt"\\]/, '{{', '}}'))),
+    escape_sequence: () => token.immediate(prec(1, choice(/\\([nrt"\\]|x[0-9a-fA-F]{2})/, '{{', '}}'))),
 
     // ---- expressions
     expression: ($) => choice($._comparable, $.comparison, alias($._membership, $.comparison), $.not_expression, $.logical_expression),
@@ -135,13 +135,13 @@ module.exports = grammar({
     _atom: ($) => choice($.number, $.quantity, $.string, $._postfix, $.derivative),
     derivative: ($) => seq($._postfix, token.immediate("'")),
     _postfix: ($) => choice($._name, $._compound),
-    _compound: ($) => choice($.tuple, $.list, $.call_expression, $.index_expression, alias($._compound_member, $.member_expression)),
+    _compound: ($) => choice(alias($._species_ion, $.species), $.tuple, $.list, $.call_expression, $.index_expression, alias($._compound_member, $.member_expression)),
     _compound_member: ($) => seq(field('object', $._compound), $._member),
     call_expression: ($) => seq(field('function', choice($._postfix, alias('max', $.identifier))), field('arguments', $.arguments)),
     arguments: ($) => seq(token.immediate('('), nl($), optional(listed($, $._argument)), ')'),
     _loose_arguments: ($) => seq('(', nl($), optional(listed($, $._argument)), ')'),
     _argument: ($) => choice($.named_argument, $.fold, $._positional),
-    _positional: ($) => choice(alias($._species_argument, $.species), $.expression),
+    _positional: ($) => $.expression,
     named_argument: ($) => prec(1, seq(field('name', $._any_word), ':', nl($), field('value', choice($._positional, $.fold)))),
     // `sum(s in set: value of s)`.
     fold: ($) => seq(alias($._membership, $.comparison), ':', nl($), field('value', $.expression)),
@@ -176,7 +176,7 @@ module.exports = grammar({
     fields: ($) => fields_of($, $.field),
     field: ($) => choice(
       seq(alias('dissolves', $.field_name), ':', nl($), $._side),
-      seq(field('name', $._key), ':', nl($), field('value', choice($.fields, $.literal, alias($._species_value, $.species), $.expression))),
+      seq(field('name', $._key), ':', nl($), field('value', choice($.fields, $.literal, $.expression))),
     ),
     _key: ($) => choice(alias($._species, $.species), alias($._any_word, $.field_name)),
     literal: ($) => seq(field('type', $._name), $.fields),

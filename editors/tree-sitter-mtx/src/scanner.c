@@ -8,7 +8,7 @@
 
 enum Token {
     NEWLINE, BLANK_LINE, NL_CLAUSE, NL_MORE,
-    UNIT, UNIT_AFTER_AS, STATE_WORD, FIRST_WORD, NEXT_WORD, SPECIES, SPECIES_ARGUMENT, SPECIES_INDEX, SPECIES_VALUE, LESS,
+    UNIT, UNIT_AFTER_AS, STATE_WORD, FIRST_WORD, NEXT_WORD, SPECIES, SPECIES_INDEX, SPECIES_ION, LESS,
     TIGHT, SAME_LINE, BESIDE, ERROR_SENTINEL,
 };
 
@@ -34,6 +34,9 @@ static const char STEPS[] =
 
 // Words after a number that are no units.
 static const char NOT_UNITS[] = " log times pitch also noise labelled symmetric per prefixes where when over ";
+
+// After the charge of an ion.
+static const char AFTER_ION[] = " in is and or else timeout for max ";
 
 // After a preposition that is the word of a state.
 static const char AFTER_STATE_WORD[] = " and or else timeout for max ";
@@ -325,6 +328,21 @@ static bool scan_phase(TSLexer *lexer) {
     return true;
 }
 
+// Whether what follows a charge cannot follow an operator, so that it is a charge.
+static bool ends_ion(TSLexer *lexer) {
+    if (accept(lexer, '.')) return is_letter(next(lexer));
+    if (!skip_space(lexer, false)) return false;
+    if (lexer->eof(lexer)) return true;
+    switch (next(lexer)) {
+        case '\n': case ',': case ';': case ')': case ']': case '}': case '{': case '>': return true;
+        case '=': case '!': advance(lexer); return next(lexer) == '=';
+        case '<': advance(lexer); return next(lexer) != '-';
+    }
+    Word word;
+    read_word(lexer, &word);
+    return is_one_of(&word, AFTER_ION);
+}
+
 // What follows the name of a species; one without is a name like any other.
 static bool scan_species(TSLexer *lexer, const bool *valid) {
     bool charged = next(lexer) != '(' && scan_charge(lexer);
@@ -332,17 +350,12 @@ static bool scan_species(TSLexer *lexer, const bool *valid) {
     bool phased = next(lexer) == '(' && scan_phase(lexer);
     if (!charged && !phased) return false;
     if (valid[SPECIES]) return found(lexer, SPECIES);
-    // The value of a field ends its line, or the field.
-    if (valid[SPECIES_VALUE] && charged) {
-        if (!skip_space(lexer, false)) return false;
-        if (lexer->eof(lexer) || next(lexer) == '\n' || next(lexer) == '}') return found(lexer, SPECIES_VALUE);
-        if (next(lexer) == ',' || next(lexer) == ';') return found(lexer, SPECIES_VALUE);
-    }
     // A phase that has been read in part hides what follows the charge; then it is none of these.
-    if (!skip_space(lexer, true)) return false;
-    if (valid[SPECIES_INDEX] && next(lexer) == ']') return found(lexer, SPECIES_INDEX);
-    if (valid[SPECIES_ARGUMENT] && charged && (next(lexer) == ',' || next(lexer) == ')')) return found(lexer, SPECIES_ARGUMENT);
-    return false;
+    if (valid[SPECIES_INDEX]) {
+        if (!skip_space(lexer, true)) return false;
+        if (next(lexer) == ']') return found(lexer, SPECIES_INDEX);
+    }
+    return valid[SPECIES_ION] && charged && ends_ion(lexer) && found(lexer, SPECIES_ION);
 }
 
 // Whether the word that has been read begins a step: after `for` a name and `in`.
@@ -370,7 +383,7 @@ static bool scan_word(TSLexer *lexer, const bool *valid) {
         return found(lexer, first ? FIRST_WORD : NEXT_WORD);
     }
     if (valid[STATE_WORD] && is_one_of(&word, LABELS)) return is_state_word(lexer) && found(lexer, STATE_WORD);
-    if (letter && (valid[SPECIES] || valid[SPECIES_ARGUMENT] || valid[SPECIES_INDEX] || valid[SPECIES_VALUE])) return scan_species(lexer, valid);
+    if (letter && (valid[SPECIES] || valid[SPECIES_INDEX] || valid[SPECIES_ION])) return scan_species(lexer, valid);
     return false;
 }
 
