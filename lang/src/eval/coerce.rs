@@ -57,14 +57,10 @@ impl Elaborator<'_> {
                 let value = self.listed(value);
                 self.coerce(value, ty, span, what)
             }
-            // One thing is a list of one.
-            (value @ (Value::Instance(_) | Value::Qualified(..)), Type::List(inner)) => {
-                match self.coerce(value, inner, span, what) {
-                    Value::Error => Value::Error,
-                    one => Value::List(vec![one]),
-                }
-            }
-            (value @ Value::Num(_), Type::List(inner)) if matches!(**inner, Type::Quantity { .. } | Type::Int) => {
+            // One thing, or one number, is a list of one.
+            (value @ (Value::Instance(_) | Value::Qualified(..) | Value::Num(_)), Type::List(inner))
+                if !matches!(value, Value::Num(_)) || matches!(**inner, Type::Quantity { .. } | Type::Int) =>
+            {
                 match self.coerce(value, inner, span, what) {
                     Value::Error => Value::Error,
                     one => Value::List(vec![one]),

@@ -106,13 +106,12 @@ impl<'a> Elaborator<'a> {
         made
     }
 
-    /// The heat that it takes to come to equilibrium at a temperature from what a mixture holds, or held at the start, once its salts have
-    /// dissolved, with the heat of the change in heat capacity; none where there are no equilibria.
-    pub fn heat_of_settling(&mut self, id: InstanceId, temperature: NodeId, at_start: bool) -> Option<NodeId> {
+    /// The heat that it takes to come to equilibrium at a temperature from what a mixture holds once its salts have dissolved, with the heat of the change in heat capacity; none where there are no equilibria.
+    pub fn heat_of_settling(&mut self, id: InstanceId, temperature: NodeId) -> Option<NodeId> {
         if self.tables.equilibria.is_empty() || self.prototype {
             return None;
         }
-        let mode = Mode { at_start, pooled: true, ..Mode::default() };
+        let mode = Mode { at_start: self.mode().at_start, pooled: true, ..Mode::default() };
         let made = self.in_mode(mode, |lab| lab.make_speciation(id, Some(temperature), true))?;
         let heat = self.graph.solved(&made.system, Part::Heat, &made.args);
         let capacity = self.graph.solved(&made.system, Part::Capacity, &made.args);

@@ -112,8 +112,6 @@ enum Bound {
     EquilibriaHold,
     /// Whether those that have a species do.
     ConstantsHold,
-    /// The heat of coming to equilibrium at the start.
-    HeatAtStart,
     /// The activity that a gas has where it is at rest with a mixture.
     GasActivity,
     /// The gases of the file's equilibria.
@@ -152,7 +150,6 @@ const TABLE: &[(&str, Bound)] = &[
     ("settled_strength", Bound::IonicStrength),
     ("equilibria_hold", Bound::EquilibriaHold),
     ("constants_hold", Bound::ConstantsHold),
-    ("heat_at_start", Bound::HeatAtStart),
     ("gas_activity", Bound::GasActivity),
     ("gases", Bound::Gases),
     ("gas_becomes", Bound::GasBecomes),
@@ -394,12 +391,7 @@ impl Elaborator<'_> {
                 Value::Bool(self.equilibria_hold(*m, Some(*s), t.node))
             }
             (Bound::HeatOfSettling, [Value::Instance(m), Value::Num(t)]) => {
-                let node = self.heat_of_settling(*m, t.node, self.mode().at_start);
-                let node = node.unwrap_or_else(|| self.graph.number(0.0));
-                self.num(node, self.tables.units.named("Energy"))
-            }
-            (Bound::HeatAtStart, [Value::Instance(m), Value::Num(t)]) => {
-                let node = self.heat_of_settling(*m, t.node, true);
+                let node = self.heat_of_settling(*m, t.node);
                 let node = node.unwrap_or_else(|| self.graph.number(0.0));
                 self.num(node, self.tables.units.named("Energy"))
             }

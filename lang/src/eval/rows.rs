@@ -19,14 +19,12 @@ impl<'a> Elaborator<'a> {
 
     /// `row.volume`.
     pub fn cell(&mut self, id: DeclId, row: u32, name: &Name) -> Value {
-        let Some((table, _, columns, _)) = self.table(id) else { return Value::Error };
-        if name.text == "line"
-            && !columns.iter().any(|c| c.name.text == "line")
-            && let Some(row) = self.table(id).and_then(|(.., rows)| rows.rows.get(row as usize))
-        {
+        let Some((table, _, columns, rows)) = self.table(id) else { return Value::Error };
+        let index = columns.iter().position(|column| column.name.text == name.text);
+        if let Some(row) = rows.rows.get(row as usize).filter(|_| index.is_none() && name.text == "line") {
             return self.number(f64::from(row.line), crate::units::Dimension::one(), false);
         }
-        let Some(index) = columns.iter().position(|column| column.name.text == name.text) else {
+        let Some(index) = index else {
             let near = near::nearest(&name.text, columns.iter().map(|column| column.name.text.as_str()));
             let mut d = Diagnostic::error(
                 codes::UNKNOWN_MEMBER,
@@ -70,14 +68,15 @@ impl<'a> Elaborator<'a> {
     pub fn column_of(&mut self, items: &[Value], name: &Name) -> Option<Value> {
         let Some(Value::Row(id, _)) = items.first() else { return None };
         let (.., columns, _) = self.table(*id)?;
-        columns.iter().position(|column| column.name.text == name.text)?;
+        let index = columns.iter().position(|column| column.name.text == name.text)?;
         let rows: Option<Vec<u32>> = items
             .iter()
             .map(|item| if let Value::Row(other, row) = item { (other == id).then_some(*row) } else { None })
             .collect();
         let rows = rows?;
         self.spend_on_items(rows.len());
-        Some(Value::List(rows.into_iter().map(|row| self.cell(*id, row, name)).collect()))
+        self.note_name(name.span, |_| Some(columns[index].name.span));
+        Some(Value::List(rows.into_iter().map(|row| self.cell_at(*id, row, index)).collect()))
     }
 
     /// A row in words.

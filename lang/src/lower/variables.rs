@@ -68,18 +68,21 @@ impl<'a> Planner<'a, '_> {
         work: impl FnOnce(&mut Self, &mut Scope) -> R,
     ) -> R {
         let quiet = self.lab.prototype && matches!(why, Undecided::Branch | Undecided::Loop);
-        self.barriers.push(Barrier { depth: scope.vars.len(), why, at, quiet });
-        let result = work(self, scope);
+        self.behind(Barrier { depth: scope.vars.len(), why, at, quiet }, |plan| work(plan, scope))
+    }
+
+    /// Does something behind a barrier.
+    fn behind<R>(&mut self, barrier: Barrier, work: impl FnOnce(&mut Self) -> R) -> R {
+        self.barriers.push(barrier);
+        let result = work(self);
         self.barriers.pop();
         result
     }
 
     /// A block of which nothing decides but what is not known before a value is given: what it changes is unknown after it.
     fn unknown_block(&mut self, block: &'a Block, scope: &mut Scope) -> StepId {
-        self.barriers.push(Barrier { depth: scope.vars.len(), why: Undecided::Branch, at: block.span, quiet: true });
-        let step = self.block(block, scope);
-        self.barriers.pop();
-        step
+        let barrier = Barrier { depth: scope.vars.len(), why: Undecided::Branch, at: block.span, quiet: true };
+        self.behind(barrier, |plan| plan.block(block, scope))
     }
 
     /// Whether blocks change names that are declared outside of them.

@@ -75,10 +75,7 @@ pub(crate) fn features(
     sources: &mut Sources,
     loader: &dyn Loader,
 ) -> Vec<Diagnostic> {
-    let noting = Noting { loader, asked: RefCell::default() };
-    let found = import::features(&mut module.tree, module.file, units, sources, &noting);
-    session.beside = figure(&(session.beside, noting.asked.into_inner()));
-    found
+    noted(session, loader, |noting| import::features(&mut module.tree, module.file, units, sources, noting))
 }
 
 /// Reads the tables of a module; what is wrong with those.
@@ -89,10 +86,15 @@ pub(crate) fn tables(
     sources: &mut Sources,
     loader: &dyn Loader,
 ) -> Vec<Diagnostic> {
+    noted(session, loader, |noting| sheet::read(&mut module.tree, module.file, units, sources, noting))
+}
+
+/// Takes note of the files that something asks for: what a session knows rests on them.
+fn noted<R>(session: &mut Session, loader: &dyn Loader, work: impl FnOnce(&dyn Loader) -> R) -> R {
     let noting = Noting { loader, asked: RefCell::default() };
-    let found = sheet::read(&mut module.tree, module.file, units, sources, &noting);
+    let result = work(&noting);
     session.beside = figure(&(session.beside, noting.asked.into_inner()));
-    found
+    result
 }
 
 fn again(asked: &Asked, from: FileId, loader: &dyn Loader) -> u64 {

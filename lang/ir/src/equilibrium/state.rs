@@ -229,13 +229,9 @@ impl Problem<'_> {
             let by = self.amount_by(i, state);
             tail.iter_mut().zip(&by[..3]).for_each(|(to, by)| *to = *by);
             if places.strength() < free {
-                if self.system.virial.is_some() {
-                    let (by_placed, at) = (self.by_placed(i, state), places.placed().start - basis.masters.len());
-                    tail[at..]
-                        .iter_mut()
-                        .zip(places.placed())
-                        .enumerate()
-                        .for_each(|(j, (to, _))| *to = by_placed.of(j));
+                if !places.placed().is_empty() {
+                    let by_placed = self.by_placed(i, state);
+                    places.placed().enumerate().for_each(|(j, at)| tail[at - basis.masters.len()] = by_placed.of(j));
                 }
                 if places.temperature() < free {
                     tail[places.temperature() - basis.masters.len()] = by[3];

@@ -466,8 +466,8 @@ impl<'a> Elaborator<'a> {
             return found;
         }
         let Value::Num(n) = self.coerce(at, &Type::ratio(), span, "place") else { return Value::Error };
-        if self.prototype && self.stand_in_place(id, grid).is_some() {
-            return self.stand_in_place(id, grid).map_or(Value::Error, Value::Instance);
+        if let Some(child) = self.stand_in_place(id, grid) {
+            return Value::Instance(child);
         }
         let Some(number) = self.known(n.node) else {
             let headline = "a place must be known before the run";
