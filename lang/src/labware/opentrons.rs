@@ -207,9 +207,13 @@ impl File {
         Some([b.x - a.x, a.y - b.y, b.z - a.z])
     }
 
-    /// Labware begins at the front left corner of its place. What is about as large as that is taken to stand in its middle.
+    /// Labware begins at the front left corner of its place. What is about as large as that is taken to stand in its middle; a bin is a part of its
+    /// robot, which says where it is.
     fn aside(&self) -> [f64; 2] {
         let (Some([x, y, _]), 2) = (self.size(), self.schema_version) else { return [0.0; 2] };
+        if self.metadata.display_category == "trash" {
+            return [0.0; 2];
+        }
         let beyond = [x - FOOTPRINT[0], y - FOOTPRINT[1]];
         if beyond.iter().any(|over| *over > PLAY) { beyond.map(|over| over / 2.0) } else { [0.0; 2] }
     }
