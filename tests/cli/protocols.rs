@@ -132,15 +132,12 @@ fn a_protocol_comes_back_with_its_heights() {
 fn what_cannot_be_said_is_listed_and_stands_in_the_text() {
     let dir = folder("left_out");
     let mut steps = fill();
-    steps.insert(
-        3,
-        command("moveToCoordinates", json!({ "pipetteId": "p", "coordinates": { "x": 1, "y": 2, "z": 3 } })),
-    );
+    steps.insert(3, command("liquidProbe", json!({ "pipetteId": "p" })));
     write(&dir, "a.json", analysis(steps).to_string());
     let imported = matterixc_in(&dir, &["import", "opentrons", "a.json"]);
     assert_eq!(imported.code, 0, "{}", imported.err);
-    assert!(imported.err.contains("moveToCoordinates (command 10)"), "{}", imported.err);
-    assert!(imported.out.contains("// not imported: moveToCoordinates, as "), "{}", imported.out);
+    assert!(imported.err.contains("liquidProbe (command 10)"), "{}", imported.err);
+    assert!(imported.out.contains("// not imported: liquidProbe, as "), "{}", imported.out);
 }
 
 #[test]
@@ -246,6 +243,28 @@ fn what_is_aspirated_at_the_rim_is_air() {
     let (text, _) = imported("at_the_rim", steps);
     assert!(text.contains("air gap 5 uL by ot2.left"), "{text}");
     assert!(text.contains("holding { A1: 469 uL of water }"), "{text}");
+}
+
+#[test]
+fn what_is_aspirated_above_the_bin_is_air() {
+    let flow = json!({ "volume": 20.0, "flowRate": 92.86 });
+    let steps = vec![
+        at("pickUpTip", "tips", "A1", 0.0, json!({})),
+        at("aspirate", "fixedTrash", "A1", 0.0, flow.clone()),
+        at("dispense", "plate", "A1", 0.0, flow),
+        at("dropTip", "fixedTrash", "A1", 0.0, json!({})),
+    ];
+    let (err, text) = listed("above_the_bin", steps);
+    assert!(
+        err.is_empty() && text.contains("move ot2.left to ot2.trash[A1]\n    air gap 20 uL by ot2.left"),
+        "{err}{text}"
+    );
+    // In Python the bin is no place for it.
+    let dir = folder("above_the_bin_emitted");
+    write(&dir, "a.mtx", text);
+    assert_eq!(matterixc_in(&dir, &["check", "--strict", "a.mtx"]).code, 0);
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert!(emitted.code == 1 && flat(&emitted.err).contains("no call for `aspirateInPlace`"), "{}", emitted.err);
 }
 
 #[test]
@@ -461,5 +480,263 @@ workflow go in deck {{
         write(&dir, "a.mtx", text(line));
         let checked = matterixc_in(&dir, &["check", "a.mtx"]);
         assert!(flat(&checked.out).contains(why), "{line}: {}", checked.out);
+    }
+}
+
+/// What `import` says of steps, and the text.
+fn listed(name: &str, steps: Vec<Value>) -> (String, String) {
+    let dir = folder(name);
+    write(&dir, "a.json", analysis(steps).to_string());
+    let imported = matterixc_in(&dir, &["import", "opentrons", "a.json", "--out", "a.mtx"]);
+    assert_eq!(imported.code, 0, "{}", imported.err);
+    (imported.err, std::fs::read_to_string(dir.join("a.mtx")).expect("it is written"))
+}
+
+fn module(id: &str, model: &str, slot: &str) -> Value {
+    json!({
+        "commandType": "loadModule",
+        "params": { "model": model, "location": { "slotName": slot } },
+        "result": { "moduleId": id, "model": model },
+    })
+}
+
+#[test]
+fn what_hangs_below_a_pipette_is_its_tip() {
+    let dir = folder("hanging");
+    let text = |height: u32, from: &str| {
+        format!(
+            "mtx 1\nuse std::opentrons::{{Corning96, OT2, P1000Single, TipRack1000, TrashBin}}
+use std::labware::Labware
+asset Falcons from labware \"opentrons_15_tuberack_falcon_15ml_conical/1\"
+asset Tower: Labware {{ shape: box(100 mm, 60 mm, {height} mm) }}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P1000Single }} at (0, 0, 0) m
+    tips = TipRack1000 on ot2.slot[4]
+    tower = Tower on ot2.slot[5]
+    tubes = Falcons on ot2.slot[6] holding {{ A1: 14 mL of water }}
+}}
+workflow go in deck {{
+    pick up tip from tips by ot2.left
+    aspirate 500 uL from tubes[A1] by ot2.left at {from}
+    dispense 500 uL into tubes[A2] by ot2.left at top - 20 mm
+    drop tip by ot2.left
+}}\n"
+        )
+    };
+    // Retracted nozzles are 250 mm above the deck, a tip of 1000 uL hangs 80 mm below them, wherever it goes.
+    let cases = [
+        (150, "bottom + 75 mm", "no findings"),
+        (150, "bottom + 1 mm", "no findings"),
+        (178, "top - 60 mm", "error[collision]"),
+    ];
+    for (height, from, why) in cases {
+        write(&dir, "a.mtx", text(height, from));
+        let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+        assert!(flat(&checked.out).contains(why), "{height} mm, {from}: {}", checked.out);
+    }
+}
+
+#[test]
+fn labware_of_several_places_begins_at_its_own() {
+    let dir = folder("wide_labware");
+    // 260 mm wide: in the places 10 and 11, and not half beside the deck.
+    let well = |x: f64| json!({ "depth": 99.0, "diameter": 15.99, "totalLiquidVolume": 15000, "shape": "circular", "x": x, "y": 72.76, "z": 3.55 });
+    let definition = json!({
+        "schemaVersion": 2, "version": 1, "namespace": "custom_beta",
+        "metadata": { "displayCategory": "tubeRack", "displayName": "Wide" },
+        "parameters": { "isTiprack": false, "loadName": "wide", "format": "irregular", "isMagneticModuleCompatible": false },
+        "dimensions": { "xDimension": 260.0, "yDimension": 85.5, "zDimension": 110.7 },
+        "wells": { "A1": well(24.87), "A8": well(235.12) },
+        "ordering": [["A1"], ["A8"]],
+    });
+    write(&dir, "wide.json", definition.to_string());
+    let text = "mtx 1
+use std::opentrons::{OT2, P300Single, TipRack300}
+asset Wide from labware \"wide.json\"
+lab deck {
+    ambient: 22 degC
+    ot2 = OT2 { left: P300Single } at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[9]
+    rack = Wide on ot2.slot[10] holding { A1: 1 mL of water }
+}
+workflow go in deck {
+    pick up tip from tips by ot2.left
+    aspirate 200 uL from rack[A1] by ot2.left
+    dispense 200 uL into rack[A8] by ot2.left
+    drop tip by ot2.left
+}
+";
+    write(&dir, "a.mtx", text);
+    let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+    assert_eq!(checked.code, 0, "{}", checked.out);
+    // Where the body is, nothing else may stand.
+    write(&dir, "a.mtx", text.replace("    rack =", "    more = TipRack300 on ot2.slot[11]\n    rack ="));
+    let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+    assert_eq!(checked.code, 1, "{}", checked.out);
+}
+
+#[test]
+fn channels_reach_the_wells_that_they_are_over() {
+    // Rows that are a little further apart than channels, and rows twice as far apart.
+    let spread = |pitch: f64| {
+        let mut plate = definition("wellPlate", 8, 1, [10.67, 6.86, 360.0]);
+        for (row, name) in ["A1", "B1", "C1", "D1", "E1", "F1", "G1", "H1"].iter().enumerate() {
+            plate["wells"][name]["y"] = json!(74.24 - pitch * row as f64);
+        }
+        let mut steps = vec![load("odd", ("corning_96_wellplate_360ul_flat", 2), "5", plate)];
+        let m = json!({ "pipetteId": "m", "volume": 20.0, "flowRate": 94.0 });
+        steps.push(at("pickUpTip", "tips", "A1", 0.0, m.clone()));
+        steps.push(at("aspirate", "odd", "A1", -9.0, m.clone()));
+        steps.push(at("dropTip", "fixedTrash", "A1", 0.0, m));
+        steps
+    };
+    let (err, text) = listed("near_rows", spread(9.12));
+    assert!(err.is_empty() && text.contains("aspirate 20 uL from odd.column(1) by ot2.right"), "{err}{text}");
+    let (err, _) = listed("far_rows", spread(18.0));
+    assert!(err.contains("some of its channels reach no well: aspirate (command "), "{err}");
+}
+
+#[test]
+fn a_rack_is_refilled_where_a_pause_asks_for_tips() {
+    let turn = |message: &str| {
+        let tip = [at("pickUpTip", "tips", "A1", 0.0, json!({})), at("dropTip", "fixedTrash", "A1", 0.0, json!({}))];
+        let pause = command("waitForResume", json!({ "message": message }));
+        tip.clone().into_iter().chain([pause]).chain(tip).collect::<Vec<_>>()
+    };
+    let (err, text) = listed("refilled", turn("Please refill the tip racks"));
+    assert!(err.is_empty() && text.contains("ask \"Please refill the tip racks\"\n    refill tips\n"), "{text}");
+    let dir = folder("refilled_checked");
+    write(&dir, "a.mtx", text);
+    let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+    assert_eq!(checked.code, 0, "{}", checked.out);
+    // Nobody says so: the tip is not there.
+    let (err, text) = listed("not_refilled", turn("Please cover the plate"));
+    assert!(err.is_empty() && !text.contains("refill tips"), "{err}{text}");
+    let dir = folder("not_refilled_checked");
+    write(&dir, "a.mtx", text);
+    let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+    assert!(checked.out.contains("error[tip-used]"), "{}", checked.out);
+}
+
+#[test]
+fn parked_tips_are_taken_by_name() {
+    let tip = |rack: &str, name: &str| at(name, rack, "A1", 0.0, json!({}));
+    let parking =
+        load("parking", ("opentrons_96_tiprack_300ul", 1), "4", definition("tipRack", 8, 12, [59.3, 5.2, 300.0]));
+    let steps = vec![
+        parking,
+        tip("tips", "pickUpTip"),
+        tip("parking", "dropTip"),
+        tip("parking", "pickUpTip"),
+        tip("fixedTrash", "dropTip"),
+    ];
+    let (text, _) = imported("parked", steps);
+    assert!(text.contains("pick up tip parking[A1] by ot2.left"), "{text}");
+}
+
+#[test]
+fn profiles_are_temperatures_that_are_held() {
+    let block = |name: &str, more: Value| {
+        let mut params = json!({ "moduleId": "c" });
+        if let (Some(params), Value::Object(more)) = (params.as_object_mut(), more) {
+            params.extend(more);
+        }
+        command(&format!("thermocycler/{name}"), params)
+    };
+    let turn = [json!({ "celsius": 95.0, "holdSeconds": 10.0 }), json!({ "celsius": 60.0, "holdSeconds": 30.0 })];
+    let profile: Vec<Value> = turn.iter().cycle().take(8).cloned().collect();
+    let steps = vec![
+        module("c", "thermocyclerModuleV1", "7"),
+        block("openLid", json!({})),
+        block(
+            "setTargetBlockTemperature",
+            json!({ "celsius": 98.0, "blockMaxVolumeUl": 25.0, "holdTimeSeconds": 120.0 }),
+        ),
+        block("waitForBlockTemperature", json!({})),
+        block("runProfile", json!({ "profile": profile, "blockMaxVolumeUl": 25.0 })),
+        block("deactivateBlock", json!({})),
+        block("deactivateLid", json!({})),
+    ];
+    let (err, text) = listed("profile", steps);
+    assert_eq!(err, "");
+    for lines in [
+        "heat cycler to 98 degC { volume: 25 uL }\n    settle cycler\n    wait 2 min\n",
+        "repeat 4 times {",
+        "heat cycler to 60 degC { volume: 25 uL }\n        settle cycler\n        wait 30 s\n",
+        "stop heating cycler\n",
+    ] {
+        assert!(text.contains(lines), "{lines}: {text}");
+    }
+    let dir = folder("profile_emitted");
+    write(&dir, "a.mtx", text);
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert_eq!(emitted.code, 0, "{}", emitted.err);
+    assert!(emitted.out.contains("cycler.set_block_temperature(95, block_max_volume=25)"), "{}", emitted.out);
+}
+
+#[test]
+fn a_module_may_be_switched_off_as_a_precaution() {
+    let stop = command("temperatureModule/deactivate", json!({ "moduleId": "t" }));
+    let (text, _) = imported("precaution", vec![module("t", "temperatureModuleV2", "4"), stop]);
+    assert!(text.contains("stop heating cooler { anyway: true }"), "{text}");
+}
+
+#[test]
+fn a_temperature_may_be_waited_for_later() {
+    let set = command("temperatureModule/setTargetTemperature", json!({ "moduleId": "t", "celsius": 37.0 }));
+    let wait = command("temperatureModule/waitForTemperature", json!({ "moduleId": "t", "celsius": 37.0 }));
+    let stop = command("temperatureModule/deactivate", json!({ "moduleId": "t" }));
+    let note = command("comment", json!({ "message": "Warming up" }));
+    let (_, text) = listed("later", vec![module("t", "temperatureModuleV2", "4"), set, note, wait, stop]);
+    let dir = folder("later_emitted");
+    write(&dir, "a.mtx", text);
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert_eq!(emitted.code, 0, "{}", emitted.err);
+    for line in ["cooler.start_set_temperature(37)", "cooler.await_temperature(37)"] {
+        assert!(emitted.out.contains(line), "{line}: {}", emitted.out);
+    }
+}
+
+#[test]
+fn pipettes_go_above_racks_and_the_deck() {
+    let place = json!({ "pipetteId": "p", "coordinates": { "x": 20.0, "y": 90.5, "z": 150.0 }, "forceDirect": false });
+    let steps = vec![at("moveToWell", "tips", "B2", 30.0, json!({})), command("moveToCoordinates", place)];
+    let (text, protocol) = imported("above", steps);
+    for line in ["hover ot2.left at tips[B2] { z: 30 mm }", "steer ot2.left at 150 mm { x: 20 mm, y: 90.5 mm }"] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    let all = protocol["commands"].as_array().expect("commands");
+    let find = |name: &str| &all.iter().find(|c| c["commandType"] == name).expect("it is there")["params"];
+    assert_eq!(find("moveToWell")["wellLocation"]["offset"]["z"], 30.0);
+    assert_eq!(find("moveToCoordinates")["coordinates"], json!({ "x": 20.0, "y": 90.5, "z": 150.0 }));
+}
+
+#[test]
+fn air_in_a_tip_fills_no_well() {
+    let dir = folder("air_fills_nothing");
+    let text = |held: u32| {
+        format!(
+            "mtx 1\nuse std::opentrons::{{Corning96, OT2, P300Single, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Single }} at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[1]
+    plate = Corning96 on ot2.slot[2] holding {{ A1: 100 uL of water, B1: {held} uL of water }}
+}}
+workflow go in deck {{
+    pick up tip from tips by ot2.left
+    aspirate 250 uL from plate[A1] by ot2.left {{ partial: true }}
+    air gap 20 uL by ot2.left
+    dispense 270 uL into plate[B1] by ot2.left
+    drop tip by ot2.left
+}}\n"
+        )
+    };
+    for (held, code) in [(250, 0), (270, 1)] {
+        write(&dir, "a.mtx", text(held));
+        let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+        assert_eq!(checked.code, code, "{held}: {}", checked.out);
+        assert!(code == 0 || checked.out.contains("and this adds"), "{}", checked.out);
     }
 }

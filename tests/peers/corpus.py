@@ -18,8 +18,8 @@ The protocols are parted by the first byte of the SHA-256 of their folder's name
 made with; odd is the half held back (`--half held`).
 
 A protocol passes where all its commands are imported, `check` reports no error, and the two analyses do the same. Where `check`
-reports an overflow or a well that runs dry, and the volumes of the original's own analysis (corpus_faults.py) show that well to
-hold more than it can, or to give more than it can ever have held, the protocol is counted apart: a fault of the protocol's was
+reports an overflow, a well that runs dry, a tip that was taken before, put onto another one or does not fit, or the importer a channel that is over no well, and the
+original's own analysis shows the same without either (corpus_faults.py), the protocol is counted apart: a fault of the protocol's was
 found. Any other error is false, and the protocol fails.
 """
 
@@ -37,8 +37,10 @@ import sys
 
 from corpus_analysis import analyse, files_of
 from corpus_compare import difference
-from corpus_faults import faults
+from corpus_faults import channels, faults
 
+#: Findings of `check`, and what corpus_faults.py calls them.
+CODES = {"volume-overflow": "overflow", "volume-underflow": "underflow", "tip-used": "tip-used", "wrong-spot": "wrong-spot", "wrong-tip": "wrong-tip"}
 STAGES = ["analyse", "import", "again", "compare", "report"]
 
 
@@ -115,7 +117,7 @@ class Case:
             out.unlink(missing_ok=True)
             said = {"lost": [], "errors": [], "warnings": []}
             _, err, status = self.command("import", "opentrons", self.file("engine.json"), "--out", plan)
-            said["lost"] = lost(err)
+            said["lost"], said["numbers"] = lost(err), numbers(err)
             if status != 0:
                 return {**said, "failed": "import", "why": last(err)}
             found, err, status = self.command("check", "--format", "json", plan)
@@ -157,11 +159,24 @@ class Case:
         found = []
         for error in errors:
             label = re.search(r"`\w+\[(\w+)\]`", error["text"])
-            same = [f for f in known if label and f"volume-{f[0]}" == error["code"] and f[1].startswith(f"{label[1]} of ")]
+            if error["code"] == "wrong-tip":
+                # The whole rack is named.
+                same = [f for f in known if f[0] == "wrong-tip"]
+                if not same:
+                    return None
+                found += same
+                continue
+            same = [f for f in known if label and CODES.get(error["code"]) == f[0] and f[1].startswith(f"{label[1]} of ")]
             if not same:
                 return None
             found += same
         return sorted(found)
+
+    def goes_beside(self, said):
+        """Whether nothing is lost but commands in which a channel with a tip is over no well."""
+        if not said["lost"] or not all(reason.endswith(": some of its channels reach no well") for reason in said["lost"]):
+            return False
+        return set(said["numbers"]) <= channels(json.loads(self.file("engine.json").read_text()))[1]
 
     def outcome(self, upto):
         """What became of it: `pass`, `fault`, `uncounted` or `fail`, and why."""
@@ -178,6 +193,8 @@ class Case:
             known = self.fault(said["errors"])
             if known:
                 return "fault", f"{known[0][0]} of {known[0][1]}"
+        if self.goes_beside(said):
+            return "fault", "a channel over no well"
         if said["lost"]:
             return "fail", "lost: " + said["lost"][0]
         if said.get("failed") == "check" and said["errors"]:
@@ -204,6 +221,12 @@ def lost(err):
             names = dict.fromkeys(re.findall(r"(\S+) \(command \d+\)", match[2]))
             found += [f"{name}: {general(match[1])}" for name in names]
     return list(dict.fromkeys(found))
+
+
+def numbers(err):
+    """The numbers of the commands that were not imported, as far as they are listed: the first ones for each reason."""
+    lines = [line for line in err.splitlines() if line.strip().startswith("not imported because ")]
+    return sorted({int(number) for line in lines for number in re.findall(r"\(command (\d+)\)", line)})
 
 
 def findings(text):

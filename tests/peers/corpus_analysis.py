@@ -8,6 +8,9 @@ does not do for old levels is patched while this runs:
 - `max_speeds` is no part of an analysis; the engine has none, so a protocol may set what nobody reads.
 - `InstrumentContext.speed`, speeds of plungers, is as little part of it: read and set, it changes nothing.
 - `MagneticModuleContext.calibrate` does nothing.
+- The lid of a thermocycler is open at first, as the older core has it; the engine has it closed until a protocol opens it.
+- `hw_pipette` says whether a pipette has a tip, and how much is in it; the engine has no hardware to ask while it analyses.
+- `Well.geometry` gives the sizes of a well, which it has under other names.
 - `engage(height=...)` counts from the magnets' home, in steps of the model; the engine counts from the labware's bottom in mm.
 
 `form="plain"` leaves all of that out: an analysis as `opentrons analyze` makes it, but for the one line that its `load_module`
@@ -15,6 +18,7 @@ needs on Python 3.11 (`patch_modules`).
 """
 
 import asyncio
+import dataclasses
 import importlib
 import json
 import os
@@ -103,6 +107,40 @@ def engine_form():
 
     magnets.engage = engage_from_home
     module_contexts.MagneticModuleContext.calibrate = lambda self: None
+
+    thermocyclers = importlib.import_module("opentrons.protocol_engine.state.module_substates.thermocycler_module_substate")
+    from_live_data = thermocyclers.ThermocyclerModuleSubState.from_live_data.__func__
+
+    def opened(cls, module_id, data):
+        at_first = from_live_data(cls, module_id, data)
+        return at_first if data is not None else dataclasses.replace(at_first, is_lid_open=True)
+
+    thermocyclers.ThermocyclerModuleSubState.from_live_data = classmethod(opened)
+
+    def hardware_state(self):
+        pipettes, own = self._engine_client.state.pipettes, self._pipette_id
+        tip = pipettes.get_attached_tip(own)
+        volume = 0.0 if tip is None else pipettes.get_aspirated_volume(own)
+        return {
+            "name": self.get_pipette_name(),
+            "channels": pipettes.get_channels(own),
+            "min_volume": pipettes.get_minimum_volume(own),
+            "max_volume": pipettes.get_maximum_volume(own),
+            "has_tip": tip is not None,
+            "current_volume": volume or 0.0,
+        }
+
+    importlib.import_module(api + "core.engine.instrument").InstrumentCore.get_hardware_state = hardware_state
+
+    class Geometry:
+        """Sizes of a well by the names that they had."""
+
+        def __init__(self, well):
+            self._depth, self._diameter, self.max_volume = well.depth, well.diameter, well.max_volume
+            self._length, self._width = well.length, well.width
+            self.depth, self.diameter, self.length, self.width = well.depth, well.diameter, well.length, well.width
+
+    importlib.import_module("opentrons.protocol_api.labware").Well.geometry = property(Geometry)
 
     class Speeds:
         aspirate = dispense = blow_out = 0.0

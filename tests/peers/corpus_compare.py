@@ -1,12 +1,16 @@
 """What an analysis of Opentrons' software does, in a form in which two can be compared.
 
 `deeds` lists what is done: verb, by what, where, how much, how. Two analyses do the same where their lists are the same: in order,
-volumes to 1e-9 uL, heights to 1e-6 mm, flow rates and speeds to 1e-9 of what they are, temperatures and times to 1e-9.
+volumes to 1e-9 uL (of a whole well 1e-12 of it, if that is more), heights to 1e-6 mm, flow rates and speeds to 1e-9 of what they are, temperatures and times to 1e-9.
 
 Not compared, as nothing physical: what is loaded, in which order, and what wells are said to hold at first; identifiers and labels;
 that the robot goes home before it does anything, which it does by itself; a move to where the pipette is, or to where the next step
-goes by itself; the white space of messages; whether a message stands in a delay or before it. Everything else that one analysis has and the other one has not is a
-difference: comments, pauses, delays, lights, homing, moves, blow-outs, touched tips, air gaps.
+goes by itself; the white space of messages; whether a message stands in a delay or before it; that a rack counts as full again right
+behind a pause, at which a person refills it. Everything else that one analysis has and the other one has not is a difference: comments,
+pauses, delays, lights, homing, moves, blow-outs, touched tips, air gaps.
+
+To aspirate or dispense 0 uL is to move there. A profile of a thermocycler is its temperatures, each waited for and held; a temperature
+that is held for a time is one that is waited for, and a wait.
 
 Places are named by what stands where (slot, module or labware below, and definition); heights count from the bottom, whichever end
 they are given from. Commands at the place of the tip are those of the place it moved to.
@@ -28,6 +32,7 @@ class Reader:
         self.at = {}  # by mount: where the tip is
         self.aimed = {}  # by mount: the area it was moved over
         self.targets = {}  # by module: what it was set to
+        self.holds = {}  # by module: for how long it holds that, once it is there
         self.out = []
 
     def say(self, verb, *what):
@@ -82,6 +87,10 @@ class Reader:
         mount = self.pipettes[params["pipetteId"]][0] if "pipetteId" in params else None
         volume = params.get("volume", result.get("volume"))
         flow = params.get("flowRate")
+        if kind in ("aspirate", "dispense") and volume == 0:
+            kind, params = "moveToWell", {key: params[key] for key in ("labwareId", "wellName", "wellLocation") if key in params}
+        if kind in ("aspirateInPlace", "dispenseInPlace") and volume == 0:
+            return None
         match kind:
             case "pickUpTip" | "dropTip":
                 spot = self.spot(params)
@@ -151,10 +160,32 @@ class Reader:
                 if kind.endswith("setTargetTemperature"):
                     self.targets[module] = celsius
                 self.say(kind, module, self.targets.get(module) if celsius is None else celsius)
+            case "thermocycler/setTargetBlockTemperature":
+                module = self.modules[params["moduleId"]]
+                self.holds[module] = params.get("holdTimeSeconds") or 0.0
+                self.block(module, params["celsius"], params)
+            case "thermocycler/waitForBlockTemperature":
+                module = self.modules[params["moduleId"]]
+                self.held(module, self.holds.pop(module, 0.0))
+            case "thermocycler/runProfile":
+                module = self.modules[params["moduleId"]]
+                for step in params["profile"]:
+                    self.block(module, step["celsius"], params)
+                    self.held(module, step["holdSeconds"])
             case _:
                 rest = {key: value for key, value in params.items() if key not in ("pipetteId", "moduleId", "labwareId")}
                 about = self.modules.get(params.get("moduleId"), mount)
                 self.say(kind, about, *frozen(rest))
+
+    def block(self, module, celsius, params):
+        """A set point of a thermocycler, with the volume that it allows for."""
+        self.say("thermocycler/setTargetBlockTemperature", module, celsius, params.get("blockMaxVolumeUl"))
+
+    def held(self, module, seconds):
+        """Its temperature is waited for, and held."""
+        self.say("thermocycler/waitForBlockTemperature", module)
+        if seconds:
+            self.say("wait", seconds)
 
     def comment(self, message):
         message = " ".join((message or "").split())
@@ -267,6 +298,7 @@ def reached(labware, well, channels):
 def difference(before, after):
     """The first thing that two analyses do not do alike, as what kind of difference and as a text; empty where there is none."""
     a, b = deeds(before), deeds(after)
+    b = without_refills(a, b)
     for index, (one, two) in enumerate(itertools.zip_longest(a, b)):
         if one is not None and two is not None and same(one, two):
             continue
@@ -279,9 +311,23 @@ def difference(before, after):
         return f"{two[0]} added", text
     one, two = volumes(before), volumes(after)
     for well in sorted(one.keys() | two.keys()):
-        if abs(one.get(well, 0.0) - two.get(well, 0.0)) > 1e-9:
+        if not math.isclose(one.get(well, 0.0), two.get(well, 0.0), rel_tol=1e-12, abs_tol=1e-9):
             return "volume of a well", f"{well}: {one.get(well)} became {two.get(well)}"
     return "", ""
+
+
+def without_refills(a, b):
+    """The second list without the refilled racks right behind a pause that the first one does not say."""
+    out, rest = [], iter(a)
+    one, behind = next(rest, None), False
+    for two in b:
+        told = one is not None and same(one, two)
+        if two[0] == "tips" and behind and not told:
+            continue
+        behind = two[0] == "pause" or (behind and two[0] == "tips")
+        out.append(two)
+        one = next(rest, None)
+    return out
 
 
 def part(verb, index, one, two):

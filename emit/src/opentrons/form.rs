@@ -37,6 +37,8 @@ pub(super) enum Holds {
     Origin,
     /// How far from that along an axis, mm.
     Offset,
+    /// How far from the corner of the deck along an axis, mm.
+    Coordinate,
     /// What a thing stands on: a place of the deck, or a module.
     Location,
     /// A labware definition by `NAMESPACE/NAME/VERSION`.
@@ -105,6 +107,12 @@ const FORMS: &[Form] = &[
         &[("well", Well)],
         &[("forceDirect", Flag), ("speed", Holds::Given), ("minimumZHeight", Holds::Given)],
     ),
+    form(
+        "moveToCoordinates",
+        About::Pipette,
+        &[("x", Holds::Coordinate), ("y", Holds::Coordinate), ("z", Holds::Coordinate)],
+        &[("forceDirect", Flag), ("speed", Holds::Given), ("minimumZHeight", Holds::Given)],
+    ),
     form("aspirateInPlace", About::Pipette, &[("volume", Number), ("flowRate", Number)], &[]),
     form("dropTip", About::Pipette, &[("well", Well)], &[("alternateDropLocation", Flag)]),
     form(
@@ -118,7 +126,12 @@ const FORMS: &[Form] = &[
     form("home", About::Robot, &[], &[("mount", Holds::Mount), ("plunger", Holds::Plunger)]),
     form("thermocycler/openLid", About::Module, &[], &[]),
     form("thermocycler/closeLid", About::Module, &[], &[]),
-    form("thermocycler/setTargetBlockTemperature", About::Module, &[("celsius", Number)], &[]),
+    form(
+        "thermocycler/setTargetBlockTemperature",
+        About::Module,
+        &[("celsius", Number)],
+        &[("blockMaxVolumeUl", Holds::Given)],
+    ),
     form("thermocycler/waitForBlockTemperature", About::Module, &[], &[]),
     form("thermocycler/deactivateBlock", About::Module, &[], &[]),
     form("thermocycler/setTargetLidTemperature", About::Module, &[("celsius", Number)], &[]),

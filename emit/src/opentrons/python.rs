@@ -1,6 +1,6 @@
 //! A protocol as Python.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use matterix_ir::{Diagnostic, Span};
@@ -14,7 +14,13 @@ use crate::place;
 
 /// The file, or what the Python API has no call for.
 pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>> {
-    let mut script = Script { text: String::new(), rates: BTreeMap::new(), aimed: None };
+    let mut script = Script {
+        text: String::new(),
+        rates: BTreeMap::new(),
+        targets: BTreeMap::new(),
+        binned: BTreeSet::new(),
+        aimed: None,
+    };
     script.head(protocol);
     let mut found = Vec::new();
     for command in &protocol.loads {
@@ -30,12 +36,17 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
             let (file, line, text) = place::line(protocol.subject.sources, command.at);
             script.line(&format!("# {file}:{line}: {text}"));
         }
+        if command.name == "temperatureModule/setTargetTemperature" {
+            script.targets.insert(command.text("moduleId").to_owned(), shown(command.params.get("celsius")));
+        }
         // One call brings a module to a temperature and waits for it.
         if let Some((_, wait, call)) = TEMPERED.iter().find(|(set, ..)| *set == command.name) {
             let waits = |next: &&Command| next.name == *wait && next.text("moduleId") == command.text("moduleId");
             if commands.next_if(waits).is_some() {
                 let celsius = shown(command.params.get("celsius"));
-                script.line(&format!("{}.{call}({celsius})", command.text("moduleId")));
+                let volume = command.params.get("blockMaxVolumeUl");
+                let volume = volume.map_or(String::new(), |v| format!(", block_max_volume={}", shown(Some(v))));
+                script.line(&format!("{}.{call}({celsius}{volume})", command.text("moduleId")));
                 continue;
             }
         }
@@ -62,6 +73,10 @@ struct Script {
     text: String,
     /// Flow rates as they were last set, by pipette and what flows.
     rates: BTreeMap<(String, &'static str), f64>,
+    /// What temperature modules were set to last, degC.
+    targets: BTreeMap<String, String>,
+    /// Pipettes that were at the bin last: it is no place for what is done in place.
+    binned: BTreeSet<String>,
     /// The pipette that was brought over an area to drop its tip.
     aimed: Option<String>,
 }
@@ -95,7 +110,10 @@ impl Script {
             let offset = |axis: &str| c.params.get("wellLocation").and_then(|l| l["offset"][axis].as_f64());
             ["x", "y"].iter().any(|axis| offset(axis).is_some_and(|off| off != 0.0))
         };
-        if protocol.commands.iter().any(is_aside) {
+        let is_place = |c: &Command| c.name == "moveToCoordinates";
+        if protocol.commands.iter().any(is_place) {
+            self.text.push_str("from opentrons.types import Location, Point\n\n");
+        } else if protocol.commands.iter().any(is_aside) {
             self.text.push_str("from opentrons.types import Point\n\n");
         }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
@@ -175,6 +193,11 @@ impl Script {
         let spot = spot(command, &well);
         let offset = |axis: &str| shown(command.params.get("wellLocation").map(|location| &location["offset"][axis]));
         let aimed = self.aimed.take();
+        match (text("labwareId"), command.params.contains_key("coordinates")) {
+            (BIN, _) => drop(self.binned.insert(pipette.to_owned())),
+            ("", false) => {}
+            _ => drop(self.binned.remove(pipette)),
+        }
         match command.name {
             "pickUpTip" => self.line(&format!("{pipette}.pick_up_tip({spot})")),
             "aspirate" => {
@@ -189,6 +212,7 @@ impl Script {
                 self.rate(command, "blow_out");
                 self.line(&format!("{pipette}.blow_out({spot})"));
             }
+            "aspirateInPlace" if self.binned.contains(pipette) => return false,
             "aspirateInPlace" => {
                 self.rate(command, "aspirate");
                 self.line(&format!("{pipette}.aspirate({})", number("volume")));
@@ -199,7 +223,12 @@ impl Script {
                 offset("z"),
                 number("speed")
             )),
-            "moveToWell" => {
+            "moveToWell" | "moveToCoordinates" => {
+                let at = |axis: &str| shown(command.params.get("coordinates").map(|place| &place[axis]));
+                let spot = match command.name {
+                    "moveToWell" => spot,
+                    _ => format!("Location(Point({}, {}, {}), None)", at("x"), at("y"), at("z")),
+                };
                 let direct = command.params.get("forceDirect") == Some(&Value::Bool(true));
                 let direct = if direct { ", force_direct=True" } else { "" };
                 let given = |key: &str, name: &str| {
@@ -229,6 +258,10 @@ impl Script {
             "temperatureModule/setTargetTemperature" => {
                 self.line(&format!("{module}.start_set_temperature({})", number("celsius")));
             }
+            "temperatureModule/waitForTemperature" => match self.targets.get(module) {
+                Some(celsius) => self.line(&format!("{module}.await_temperature({celsius})")),
+                None => return false,
+            },
             "temperatureModule/deactivate" => self.line(&format!("{module}.deactivate()")),
             "magneticModule/engage" => self.line(&format!("{module}.engage(height_from_base={})", number("height"))),
             "magneticModule/disengage" => self.line(&format!("{module}.disengage()")),

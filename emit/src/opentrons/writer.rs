@@ -155,6 +155,10 @@ impl Writer<'_, '_> {
                     // None is not less than none.
                     offset[*name] = (parsed(message, name, value)? + 0.0).into();
                 }
+                Holds::Coordinate => {
+                    let place = params.entry("coordinates").or_insert_with(|| json!({}));
+                    place[*name] = (parsed(message, name, value)? + 0.0).into();
+                }
                 Holds::Location => drop(params.insert(
                     key,
                     match self.deck.location(value) {

@@ -13,6 +13,9 @@ use super::words;
 /// The name space of definitions that come with Opentrons' software.
 const OWN: &str = "opentrons";
 
+/// What definitions say of labware over whose wells the middle of all channels goes.
+const CENTRED: &str = "centerMultichannelOnWells";
+
 /// How far apart channels are, mm.
 const PITCH: f64 = 9.0;
 
@@ -23,16 +26,42 @@ pub(super) enum Kind {
     Tips,
 }
 
+/// The opening of a well, mm: its diameter, or from left to right and from front to back.
+#[derive(Clone, Copy, Debug)]
+enum Opening {
+    Round(f64),
+    Square([f64; 2]),
+}
+
+impl Opening {
+    fn area(self) -> f64 {
+        match self {
+            Opening::Round(diameter) => PI * diameter * diameter / 4.0,
+            Opening::Square([wide, deep]) => wide * deep,
+        }
+    }
+}
+
 /// A well as its definition has it, mm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Well {
     pub(super) depth: f64,
-    /// Of its opening, mm2.
-    area: f64,
+    opening: Opening,
     /// What it holds, uL.
     capacity: f64,
     x: f64,
     y: f64,
+}
+
+impl Well {
+    /// Whether its opening is at a place of its labware.
+    fn opens_at(&self, x: f64, y: f64) -> bool {
+        let [right, back] = [(x - self.x).abs(), (y - self.y).abs()];
+        match self.opening {
+            Opening::Round(diameter) => right.hypot(back) <= diameter / 2.0,
+            Opening::Square([wide, deep]) => right <= wide / 2.0 && back <= deep / 2.0,
+        }
+    }
 }
 
 /// A piece of labware.
@@ -46,6 +75,8 @@ pub(super) struct Labware {
     pub(super) wells: BTreeMap<String, Well>,
     /// Wells in the order of columns.
     pub(super) order: Vec<String>,
+    /// Whether the middle of all channels goes to the middle of a well, and not the first channel.
+    is_centred: bool,
 }
 
 impl Labware {
@@ -61,13 +92,12 @@ impl Labware {
         self.order.iter().filter_map(|well| cell(well)).map(|(_, column)| column as usize).max().unwrap_or(0)
     }
 
-    /// The well that each of so many channels in a row reaches from one, if any.
+    /// The well over which each of so many channels in a row is, if any, where the first one is over the middle of this well.
     pub(super) fn row(&self, channels: usize, well: &str) -> Vec<Option<&str>> {
-        let column = self.column(well);
-        let first = self.wells.get(well).map_or(0.0, |well| well.y);
+        let Some(first) = self.wells.get(well) else { return vec![None; channels] };
         let at = |channel: usize| {
-            let y = first - PITCH * channel as f64;
-            column.iter().copied().find(|other| self.wells.get(*other).is_some_and(|o| (o.y - y).abs() < 0.5))
+            let (x, y) = (first.x, first.y - PITCH * channel as f64);
+            self.order.iter().find(|other| self.wells.get(*other).is_some_and(|o| o.opens_at(x, y))).map(String::as_str)
         };
         (0..channels).map(at).collect()
     }
@@ -163,7 +193,9 @@ impl Deck {
         let (wells, order) = (wells(definition), order(definition));
         let id = command.loaded("labwareId").unwrap_or(load_name).to_owned();
         self.loaded.push(id.clone());
-        self.labware.insert(id, Labware { name, asset, kind, on, wells, order });
+        let quirks = definition["parameters"]["quirks"].as_array();
+        let is_centred = quirks.is_some_and(|quirks| quirks.iter().any(|quirk| quirk == CENTRED));
+        self.labware.insert(id, Labware { name, asset, kind, on, wells, order, is_centred });
         Ok(())
     }
 
@@ -205,15 +237,17 @@ impl Deck {
         if !labware.wells.contains_key(well) {
             return Err(format!("`{of}` has no well {well}"));
         }
-        let column = labware.column(well);
-        if channels == 1 || column.len() == 1 {
+        if channels == 1 || labware.is_centred {
             return at(At::Well(well.to_owned()));
         }
         let Some(reached) = labware.row(channels, well).into_iter().collect::<Option<Vec<&str>>>() else {
             return Err("some of its channels reach no well".to_owned());
         };
+        if reached.windows(2).any(|two| two[0] == two[1]) {
+            return Err("several of its channels reach one well, and not in its middle".to_owned());
+        }
         match cell(well) {
-            Some((1, number)) if reached.len() == column.len() => at(At::Column(number as usize, labware.columns())),
+            Some((1, number)) if reached == labware.column(well) => at(At::Column(number as usize, labware.columns())),
             _ => at(At::Wells(reached.into_iter().map(str::to_owned).collect())),
         }
     }
@@ -231,7 +265,7 @@ impl Deck {
     /// What the first well of a place holds up to a height, uL: as if it were as wide as its opening, and no more than it takes.
     pub(super) fn held_below(&self, place: &Place, height: f64) -> f64 {
         let well = self.wells_of(place).first().and_then(|name| self.named(&place.of)?.wells.get(name));
-        well.map_or(0.0, |well| (well.area * height.max(0.0)).min(well.capacity))
+        well.map_or(0.0, |well| (well.opening.area() * height.max(0.0)).min(well.capacity))
     }
 
     /// Wells of a place.
@@ -254,13 +288,13 @@ fn slot(location: &Value) -> Option<String> {
 fn wells(definition: &Value) -> BTreeMap<String, Well> {
     let Some(all) = definition["wells"].as_object() else { return BTreeMap::new() };
     let number = |well: &Value, key: &str| well[key].as_f64().unwrap_or(0.0);
-    let area = |well: &Value| match well["diameter"].as_f64() {
-        Some(diameter) => PI * diameter * diameter / 4.0,
-        None => number(well, "xDimension") * number(well, "yDimension"),
+    let opening = |well: &Value| match well["diameter"].as_f64() {
+        Some(diameter) => Opening::Round(diameter),
+        None => Opening::Square(["xDimension", "yDimension"].map(|side| number(well, side))),
     };
     let read = |well: &Value| Well {
         depth: number(well, "depth"),
-        area: area(well),
+        opening: opening(well),
         capacity: number(well, "totalLiquidVolume"),
         x: number(well, "x"),
         y: number(well, "y"),

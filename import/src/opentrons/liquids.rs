@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 /// A well by labware and name.
 pub(super) type Name = (String, String);
 
+/// By well, a volume in uL.
+pub(super) type Holdings = BTreeMap<Name, f64>;
+
 /// What wells hold at the start: volume in uL, and what of.
 pub(super) type Holding = BTreeMap<Name, (f64, String)>;
 
@@ -15,16 +18,21 @@ struct Well {
     net: f64,
     /// The least that it ever was.
     least: f64,
+    /// The most that it ever was.
+    most: f64,
+    /// The least that it was before that.
+    before: f64,
     /// What must be there at the start so that tips reached the liquid.
     wet: f64,
     /// Whether something left it before anything came: it is a source, and was not filled on the way.
     is_source: bool,
 }
 
-/// A tip, uL.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tip {
-    liquid: f64,
+/// The tips of a pipette, uL: their pistons move together, but wells may hold less for some of them than for others.
+#[derive(Clone, Debug, Default)]
+struct Tips {
+    /// In each of them.
+    liquid: Vec<f64>,
     /// What the piston has taken up: liquid, and air.
     drawn: f64,
     /// Air at the end, which comes out first.
@@ -35,15 +43,15 @@ struct Tip {
 #[derive(Debug, Default)]
 pub(super) struct Liquids {
     /// What wells hold at the start, where that is known, uL.
-    initial: Option<BTreeMap<Name, f64>>,
+    initial: Option<Holdings>,
     wells: BTreeMap<Name, Well>,
-    /// By pipette: what each of its tips holds.
-    tips: BTreeMap<String, Tip>,
+    /// By pipette: what its tips hold.
+    tips: BTreeMap<String, Tips>,
 }
 
 impl Liquids {
     /// Wells that hold so much at the start, uL.
-    pub(super) fn with(initial: BTreeMap<Name, f64>) -> Liquids {
+    pub(super) fn with(initial: Holdings) -> Liquids {
         Liquids { initial: Some(initial), ..Liquids::default() }
     }
 
@@ -54,7 +62,7 @@ impl Liquids {
 
     /// Whether the tips of a pipette hold any liquid.
     pub(super) fn is_wet(&self, pipette: &str) -> bool {
-        self.tips.get(pipette).is_some_and(|tip| tip.liquid > 0.0)
+        self.tips.get(pipette).is_some_and(|tips| tips.liquid.iter().any(|liquid| *liquid > 0.0))
     }
 
     /// Each tip aspirates so much, at a height up to which a well holds `below`; whether the wells hold less.
@@ -67,7 +75,7 @@ impl Liquids {
         wells: &[String],
     ) -> bool {
         let each = volume * channels as f64 / wells.len().max(1) as f64;
-        let (mut taken, mut lacks) = (0.0_f64, false);
+        let (mut taken, mut lacks) = (Vec::new(), false);
         for well in wells {
             let name = (labware.to_owned(), well.clone());
             let initial = self.initial.as_ref().map(|initial| initial.get(&name).copied().unwrap_or(0.0));
@@ -79,54 +87,73 @@ impl Liquids {
             let there = initial.map_or(each, |initial| (initial + well.net) * (1.0 + 1e-9));
             let here = each.min(there.max(0.0));
             lacks |= here < each;
-            taken = taken.max(here);
+            taken.push(here);
             well.net -= here;
             well.least = well.least.min(well.net);
         }
-        let tip = self.tips.entry(pipette.to_owned()).or_default();
-        tip.liquid += taken * wells.len() as f64 / channels as f64;
-        tip.drawn += volume;
-        tip.air = 0.0;
+        let tips = self.tips.entry(pipette.to_owned()).or_default();
+        tips.liquid.resize(channels.max(tips.liquid.len()), 0.0);
+        let share = wells.len() as f64 / channels as f64;
+        for (channel, liquid) in tips.liquid.iter_mut().enumerate().take(channels) {
+            *liquid += taken.get(of(channel, wells)).map_or(0.0, |taken| taken * share);
+        }
+        tips.drawn += volume;
+        tips.air = 0.0;
         lacks
     }
 
     /// Each tip aspirates so much air.
     pub(super) fn air(&mut self, pipette: &str, volume: f64) {
-        let tip = self.tips.entry(pipette.to_owned()).or_default();
-        tip.drawn += volume;
-        tip.air += volume;
+        let tips = self.tips.entry(pipette.to_owned()).or_default();
+        tips.drawn += volume;
+        tips.air += volume;
     }
 
     /// Each tip dispenses so much: the air at its end first, then the same share of all that it holds, as `dispense` of the library does.
-    pub(super) fn dispense(&mut self, pipette: &str, volume: f64, channels: usize, labware: &str, wells: &[String]) {
-        let tip = self.tips.entry(pipette.to_owned()).or_default();
-        let (stroke, whole) = ((volume - tip.air).max(0.0), tip.drawn - tip.air);
-        let given = if stroke * (1.0 + 1e-9) >= whole { tip.liquid } else { tip.liquid * stroke / whole };
-        tip.liquid -= given;
-        tip.drawn = (tip.drawn - volume).max(0.0);
-        tip.air = (tip.air - volume).max(0.0);
-        self.fill(labware, wells, given * channels as f64);
+    pub(super) fn dispense(&mut self, pipette: &str, volume: f64, labware: &str, wells: &[String]) {
+        let tips = self.tips.entry(pipette.to_owned()).or_default();
+        let (stroke, whole) = ((volume - tips.air).max(0.0), tips.drawn - tips.air);
+        let share = if stroke * (1.0 + 1e-9) >= whole { 1.0 } else { stroke / whole };
+        let given: Vec<f64> = tips.liquid.iter().map(|liquid| liquid * share).collect();
+        tips.liquid.iter_mut().zip(&given).for_each(|(liquid, given)| *liquid -= given);
+        tips.drawn = (tips.drawn - volume).max(0.0);
+        tips.air = (tips.air - volume).max(0.0);
+        self.fill(labware, wells, &given);
     }
 
     /// Each tip gives off what it holds.
-    pub(super) fn blow_out(&mut self, pipette: &str, channels: usize, labware: &str, wells: &[String]) {
-        let tip = self.tips.remove(pipette).unwrap_or_default();
-        self.fill(labware, wells, tip.liquid * channels as f64);
+    pub(super) fn blow_out(&mut self, pipette: &str, labware: &str, wells: &[String]) {
+        let tips = self.tips.remove(pipette).unwrap_or_default();
+        self.fill(labware, wells, &tips.liquid);
     }
 
-    fn fill(&mut self, labware: &str, wells: &[String], volume: f64) {
-        for well in wells {
+    fn fill(&mut self, labware: &str, wells: &[String], given: &[f64]) {
+        for (channel, volume) in given.iter().enumerate() {
+            let Some(well) = wells.get(of(channel, wells)) else { continue };
             let well = self.wells.entry((labware.to_owned(), well.clone())).or_default();
-            well.net += volume / wells.len() as f64;
+            well.net += volume;
+            if well.net > well.most {
+                (well.most, well.before) = (well.net, well.least);
+            }
         }
     }
 
-    /// What sources must hold at the start, uL, by labware and well: what leaves them, and, rounded up, what tips must reach.
-    pub(super) fn needed(&self) -> impl Iterator<Item = (&Name, f64)> {
-        let needed = |well: &Well| if well.wet > -well.least { well.wet.ceil() } else { -well.least };
+    /// What sources must hold at the start, uL, by labware and well: what leaves them, and, rounded up, what tips must reach. Less than that
+    /// where what comes would not find room: tips take air for the rest then.
+    pub(super) fn needed(&self, capacity: impl Fn(&Name) -> f64) -> Holdings {
+        let needed = |name: &Name, well: &Well| {
+            let room = capacity(name) - well.most;
+            well.wet.ceil().max(-well.least).min(room).max(-well.before)
+        };
         let is_short = |well: &Well| well.is_source && -well.least > 1e-9;
-        self.wells.iter().filter(move |(_, well)| is_short(well)).map(move |(name, well)| (name, needed(well)))
+        let short = self.wells.iter().filter(|(_, well)| is_short(well));
+        short.map(|(name, well)| (name.clone(), needed(name, well))).collect()
     }
+}
+
+/// Which of some wells a channel works in: its own, or the only one.
+fn of(channel: usize, wells: &[String]) -> usize {
+    if wells.len() == 1 { 0 } else { channel }
 }
 
 #[cfg(test)]
@@ -142,12 +169,22 @@ mod tests {
         let mut liquids = Liquids::default();
         liquids.aspirate("p", 50.0, (1, 10.0), "plate", &well("A1"));
         liquids.air("p", 10.0);
-        liquids.dispense("p", 60.0, 1, "plate", &well("B1"));
+        liquids.dispense("p", 60.0, "plate", &well("B1"));
         // More than there is: the rest is air.
         liquids.aspirate("p", 70.0, (1, 75.5), "plate", &well("B1"));
         liquids.aspirate("p", 1.0, (1, 75.5), "plate", &well("C1"));
-        let needed: Vec<(String, f64)> = liquids.needed().map(|((_, well), v)| (well.clone(), v)).collect();
-        assert_eq!(needed, [("A1".to_owned(), 50.0), ("C1".to_owned(), 76.0)]);
+        let needed = |capacity: f64| -> Vec<(String, f64)> {
+            liquids.needed(|_| capacity).into_iter().map(|((_, well), v)| (well, v)).collect()
+        };
+        assert_eq!(needed(200.0), [("A1".to_owned(), 50.0), ("C1".to_owned(), 76.0)]);
+        // What tips must reach leaves room for what comes: 71 uL, where 1 uL went.
+        liquids.blow_out("p", "plate", &well("C1"));
+        let needed: Vec<f64> = liquids.needed(|_| 100.0).into_values().collect();
+        assert_eq!(needed, [50.0, 30.0]);
+        // No more room than that, even if all of it leaves in the end.
+        liquids.aspirate("p", 130.0, (1, 0.0), "plate", &well("C1"));
+        let needed: Vec<f64> = liquids.needed(|_| 100.0).into_values().collect();
+        assert_eq!(needed, [50.0, 30.0]);
     }
 
     #[test]
@@ -156,7 +193,30 @@ mod tests {
         let mut liquids = Liquids::with(initial);
         assert!(!liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
         assert!(liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
-        liquids.dispense("p", 120.0, 1, "plate", &well("B1"));
+        liquids.dispense("p", 120.0, "plate", &well("B1"));
         assert!(!liquids.aspirate("p", 100.0, (1, 0.0), "plate", &well("B1")));
+    }
+
+    #[test]
+    fn each_channel_has_what_its_own_well_gave() {
+        let initial = [("A1", 5.0), ("B1", 50.0)].map(|(well, volume)| (("plate".to_owned(), well.to_owned()), volume));
+        let mut liquids = Liquids::with(BTreeMap::from(initial));
+        let column = ["A1", "B1"].map(str::to_owned);
+        for _ in 0..3 {
+            // Mixed in place, the first well never holds more than its own.
+            assert!(liquids.aspirate("p", 20.0, (2, 0.0), "plate", &column));
+            liquids.dispense("p", 20.0, "plate", &column);
+        }
+        assert!(!liquids.aspirate("p", 5.0, (2, 0.0), "plate", &column));
+    }
+
+    #[test]
+    fn channels_share_a_trough() {
+        let mut liquids = Liquids::default();
+        liquids.aspirate("p", 10.0, (8, 0.0), "trough", &well("A1"));
+        liquids.dispense("p", 10.0, "waste", &well("A1"));
+        let needed: Vec<f64> = liquids.needed(|_| 1000.0).into_values().collect();
+        assert_eq!(needed, [80.0]);
+        assert_eq!(liquids.wells[&("waste".to_owned(), "A1".to_owned())].net, 80.0);
     }
 }

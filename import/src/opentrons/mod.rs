@@ -9,6 +9,7 @@ mod library;
 mod liquids;
 mod node;
 mod steps;
+mod tips;
 mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -104,7 +105,8 @@ fn steps<'a>(
     liquids: Liquids,
 ) -> Steps<'a> {
     let mut steps = Steps::new(analysis, deck, flows, liquids);
-    steps.park(&parked(analysis));
+    let parked = parked(analysis);
+    steps.park(&parked, tips::refills(&analysis.commands, deck, &parked));
     let is_step = |c: &Command| !c.command_type.starts_with("load");
     // The robot begins at home by itself.
     let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);
@@ -117,9 +119,10 @@ fn steps<'a>(
 /// What the protocol says that wells hold; else, of sources, what they need, as far as it fits in.
 fn holding(steps: &Steps<'_>, commands: &[Command], deck: &Deck) -> Holding {
     let mut out = steps.loaded(commands);
-    for (well, needed) in steps.liquids.needed() {
-        let most = deck.capacity(&well.0, &well.1);
-        out.entry(well.clone()).or_insert_with(|| (needed.min(most), "water".to_owned()));
+    let capacity = |(labware, well): &(String, String)| deck.capacity(labware, well);
+    for (well, needed) in steps.liquids.needed(capacity) {
+        let most = capacity(&well);
+        out.entry(well).or_insert_with(|| (needed.min(most), "water".to_owned()));
     }
     out
 }

@@ -35,6 +35,12 @@ pub(super) enum At {
     Wells(Vec<String>),
 }
 
+impl Place {
+    fn is_single(&self) -> bool {
+        matches!(self.at, At::Well(_))
+    }
+}
+
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let of = &self.of;
@@ -174,6 +180,10 @@ fn over(steps: &[Node], long: usize, times: usize) -> Option<Node> {
             ways.len() - 1
         }));
     }
+    // Wells and columns of wells are no places of one list.
+    if ways.iter().any(|way| way.iter().any(|place| place.is_single() != way[0].is_single())) {
+        return None;
+    }
     let taken: String = body.iter().map(|node| node.text.as_str()).collect();
     let name = |words: &[&str]| -> String {
         let numbered = (2..).map(|n| format!("{}_{n}", words[0]));
@@ -302,6 +312,17 @@ mod tests {
         let pairs = [("A1", "A2"), ("B1", "C2"), ("C1", "E2")];
         let steps = pairs.iter().flat_map(|(from, to)| [about("take", "a", from), about("give", "b", to)]);
         let expected = "for way in paired(a[A1 .. C1], [b[A2], b[C2], b[E2]]) {\ntake way.first\ngive way.second\n}\n";
+        assert_eq!(text(steps.collect()), expected);
+    }
+
+    #[test]
+    fn wells_and_columns_are_not_of_one_loop() {
+        let column = |n: usize| {
+            let wells = At::Wells(vec![format!("A{n}"), format!("B{n}")]);
+            Node::about("take ", Place { of: "a".into(), at: wells }, "")
+        };
+        let steps = (1..4).map(column).chain((4..7).map(|n| about("take", "a", &format!("A{n}"))));
+        let expected = "for well in [[a[A1], a[B1]], [a[A2], a[B2]], [a[A3], a[B3]]] {\ntake well\n}\nfor well in a[A4 .. A6] {\ntake well\n}\n";
         assert_eq!(text(steps.collect()), expected);
     }
 

@@ -8,6 +8,7 @@ use super::analysis::{Analysis, Command};
 use super::deck::{Deck, Kind, Mounted};
 use super::liquids::{Holding, Liquids};
 use super::node::{Node, Place};
+use super::tips::Refills;
 use super::words::{self, number};
 use crate::LeftOut;
 
@@ -19,6 +20,9 @@ const DIP: f64 = 1.0;
 
 /// Where it touches the wall by default, mm from the rim.
 const TOUCH: f64 = -1.0;
+
+/// What is switched off without having been on is switched off as a precaution.
+const ANYWAY: &str = " { anyway: true }";
 
 /// How commands call the bin.
 const TRASH: &str = "fixedTrash";
@@ -36,10 +40,14 @@ pub(super) struct Steps<'a> {
     taken: BTreeMap<String, BTreeSet<String>>,
     /// Places without a tip, by rack: those that were taken and not returned.
     absent: BTreeMap<String, BTreeSet<String>>,
+    /// Racks that a person refills, by the number of the command, counting from 0.
+    refills: Refills,
     /// How many channels of a pipette have tips, where it has any.
     tips: BTreeMap<String, usize>,
     /// What modules were set to last, degC.
     targets: BTreeMap<String, f64>,
+    /// How long modules hold their temperature once they are there, s, until that is waited for.
+    holds: BTreeMap<String, f64>,
     /// Modules that shake.
     shaking: BTreeSet<String>,
     /// The flow rates of each pipette that hold where a step says nothing, uL/s.
@@ -79,8 +87,10 @@ impl<'a> Steps<'a> {
             moved: BTreeMap::new(),
             taken: BTreeMap::new(),
             absent: BTreeMap::new(),
+            refills: Refills::new(),
             tips: BTreeMap::new(),
             targets: BTreeMap::new(),
+            holds: BTreeMap::new(),
             shaking: BTreeSet::new(),
             flows,
         }
@@ -88,11 +98,23 @@ impl<'a> Steps<'a> {
 
     /// Takes the next command; `index` counts from 1.
     pub(super) fn take(&mut self, index: usize, command: &Command) {
-        if let Err(why) = self.step(command) {
+        let done = self.step(command);
+        if let Some(racks) = self.refills.remove(&(index - 1)) {
+            racks.iter().for_each(|id| self.refilled(id));
+        }
+        if let Err(why) = done {
             let name = command.command_type.clone();
             self.nodes.push(Node::plain(format!("// not imported: {name}, as {why}")));
             self.left_out.push(LeftOut { line: index, name, why });
         }
+    }
+
+    /// A person puts a full rack in the place of one.
+    fn refilled(&mut self, id: &str) {
+        let Some(rack) = self.deck.labware.get(id) else { return };
+        self.taken.remove(id);
+        self.absent.remove(id);
+        self.nodes.push(Node::plain(format!("refill {}", rack.name)));
     }
 
     fn say(&mut self, text: impl Into<String>) -> Result<(), String> {
@@ -117,6 +139,7 @@ impl<'a> Steps<'a> {
             "blowout" => self.blow_out(command),
             "touchTip" => self.touch(command),
             "moveToWell" => self.move_to(command),
+            "moveToCoordinates" => self.move_across(command),
             "airGapInPlace" | "aspirateInPlace" => self.air(command),
             "waitForDuration" => {
                 self.message(command);
@@ -155,10 +178,14 @@ impl<'a> Steps<'a> {
         Ok(self.tips.get(command.text("pipetteId")).copied().unwrap_or(all))
     }
 
-    /// Racks that begin without tips.
-    pub(super) fn park(&mut self, racks: &BTreeSet<String>) {
+    /// Racks that begin without tips, and those that a person refills.
+    pub(super) fn park(&mut self, racks: &BTreeSet<String>, refills: Refills) {
+        self.refills = refills;
         for (id, rack) in self.deck.labware.iter().filter(|(id, _)| racks.contains(*id)) {
-            self.absent.insert(id.clone(), rack.order.iter().cloned().collect());
+            let places: BTreeSet<String> = rack.order.iter().cloned().collect();
+            self.absent.insert(id.clone(), places.clone());
+            // None of them is fresh: parked tips are taken by name.
+            self.taken.insert(id.clone(), places);
         }
     }
 
@@ -218,8 +245,11 @@ impl<'a> Steps<'a> {
         let absent = self.absent.entry(rack.to_owned()).or_default();
         let there = |well: &Option<&str>| well.is_some_and(|well| !absent.contains(well));
         let row = labware.row(channels, well);
-        let tips = row.iter().filter(|well| there(well)).count();
-        if tips == 0 || !row[..tips].iter().all(there) {
+        // Where all were taken before, they are named as they are: `check` finds that.
+        let is_empty = !row.iter().any(there);
+        let is_tip = |well: &Option<&str>| if is_empty { well.is_some() } else { there(well) };
+        let tips = row.iter().filter(|well| is_tip(well)).count();
+        if tips == 0 || !row[..tips].iter().all(is_tip) {
             return Err("the tips that its channels reach do not begin with the first channel".to_owned());
         }
         let place = self.deck.reached(tips, labware, well)?;
@@ -273,6 +303,14 @@ impl<'a> Steps<'a> {
     fn aspirate(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
         let id = command.text("pipetteId");
+        let location = &command.params["wellLocation"];
+        let is_above = location["origin"] == "top" && location["offset"]["z"].as_f64().is_none_or(|z| z > -DUST);
+        // Above the bin there is nothing but air.
+        if command.text("labwareId") == TRASH && is_above {
+            self.moved.remove(id);
+            self.nodes.push(Node::plain(format!("move {by} to ot2.trash[A1]")));
+            return self.air_gap(command, &by);
+        }
         let spot = self.spot(command)?;
         // What is aspirated at the rim or above it is air.
         if spot.above > -DUST {
@@ -298,17 +336,16 @@ impl<'a> Steps<'a> {
     }
 
     fn dispense(&mut self, command: &Command) -> Result<(), String> {
-        let (volume, channels) = (command.volume(), self.channels(command)?);
+        let volume = command.volume();
         let before = format!("dispense {} uL into ", number(volume));
         self.give(command, &before, Flow::Out, |liquids, labware, wells| {
-            liquids.dispense(command.text("pipetteId"), volume, channels, labware, wells);
+            liquids.dispense(command.text("pipetteId"), volume, labware, wells);
         })
     }
 
     fn blow_out(&mut self, command: &Command) -> Result<(), String> {
-        let channels = self.channels(command)?;
         self.give(command, "blow out into ", Flow::Blow, |liquids, labware, wells| {
-            liquids.blow_out(command.text("pipetteId"), channels, labware, wells);
+            liquids.blow_out(command.text("pipetteId"), labware, wells);
         })
     }
 
@@ -352,19 +389,32 @@ impl<'a> Steps<'a> {
     fn move_to(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
         let spot = self.spot(command)?;
-        let mut more = Vec::new();
-        if let Some(speed) = command.number("speed") {
-            more.push(format!("speed: {} mm/s", number(speed)));
-        }
-        if command.params["forceDirect"] == true {
-            more.push("direct: true".to_owned());
-        }
-        if let Some(clear) = command.number("minimumZHeight") {
-            more.push(format!("clear: {} mm", number(clear)));
+        let mut more = ways(command);
+        if self.deck.labware.get(command.text("labwareId")).is_some_and(|labware| labware.kind == Kind::Tips) {
+            if spot.above.abs() > DUST {
+                more.push(format!("z: {} mm", number(spot.above)));
+            }
+            let options = self.options(command, None, &more);
+            self.moved.remove(command.text("pipetteId"));
+            self.nodes.push(Node::about(&format!("hover {by} at "), spot.place, &options));
+            return Ok(());
         }
         let options = self.options(command, None, &more);
         self.work(command, &format!("move {by} to "), "", spot, 0.0, &options);
         Ok(())
+    }
+
+    /// Moves to a place of the deck.
+    fn move_across(&mut self, command: &Command) -> Result<(), String> {
+        let (_, by) = self.pipette(command)?;
+        let place = &command.params["coordinates"];
+        let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(|axis| place[axis].as_f64()) else {
+            return Err("it gives no place".to_owned());
+        };
+        self.moved.remove(command.text("pipetteId"));
+        let more: Vec<String> =
+            [format!("x: {} mm", number(x)), format!("y: {} mm", number(y))].into_iter().chain(ways(command)).collect();
+        self.say(format!("steer {by} at {} mm{}", number(z), words::braced(&more)))
     }
 
     fn air(&mut self, command: &Command) -> Result<(), String> {
@@ -404,9 +454,8 @@ impl<'a> Steps<'a> {
         if command.text("tipWellState") != "clean" || wells != rack.wells.len() {
             return Err("only a whole rack is refilled".to_owned());
         }
-        self.taken.remove(id);
-        self.absent.remove(id);
-        self.say(format!("refill {}", rack.name))
+        self.refilled(id);
+        Ok(())
     }
 
     fn module(&mut self, command_type: &str, command: &Command) -> Result<(), String> {
@@ -417,12 +466,23 @@ impl<'a> Steps<'a> {
         let name = known(command.text("moduleId")).ok_or("its module is not imported")?;
         let celsius = command.number("celsius").map(number).unwrap_or_default();
         match verb {
-            "setTargetBlockTemperature" if command.number("holdTimeSeconds").is_some_and(|seconds| seconds > 0.0) => {
-                Err("it holds a temperature for a time".to_owned())
+            "setTargetBlockTemperature" => {
+                let target = command.number("celsius").ok_or("it gives no temperature")?;
+                if self.holds.remove(&name).is_some() {
+                    return Err("what it was set to before is held for a time that nothing waits for".to_owned());
+                }
+                self.holds.extend(command.number("holdTimeSeconds").filter(|s| *s > 0.0).map(|s| (name.clone(), s)));
+                self.heat(&name, target, command.number("blockMaxVolumeUl"))
             }
-            "setTargetTemperature" | "setTargetBlockTemperature" => {
-                self.targets.extend(command.number("celsius").map(|celsius| (name.clone(), celsius)));
-                self.say(format!("heat {name} to {celsius} degC"))
+            "setTargetTemperature" => {
+                self.heat(&name, command.number("celsius").ok_or("it gives no temperature")?, None)
+            }
+            "runProfile" => self.profile(&name, command),
+            // The module counts the time from when it is there.
+            "waitForBlockTemperature" if self.holds.contains_key(&name) => {
+                self.say(format!("settle {name}"))?;
+                let held = self.holds.remove(&name).unwrap_or_default();
+                self.say(format!("wait {}", duration(held)))
             }
             "waitForTemperature" | "waitForBlockTemperature"
                 if command.number("celsius").is_none_or(|celsius| self.targets.get(&name) == Some(&celsius)) =>
@@ -430,7 +490,10 @@ impl<'a> Steps<'a> {
                 self.say(format!("settle {name}"))
             }
             "waitForTemperature" => Err("it waits for another temperature than the module was set to".to_owned()),
-            "deactivate" | "deactivateHeater" | "deactivateBlock" => self.say(format!("stop heating {name}")),
+            "deactivate" | "deactivateHeater" | "deactivateBlock" => {
+                let anyway = if self.targets.contains_key(&name) { "" } else { ANYWAY };
+                self.say(format!("stop heating {name}{anyway}"))
+            }
             "engage" => {
                 let height = command.number("height").ok_or("it gives no height")?;
                 self.say(format!("engage {name} at {} mm", number(height)))
@@ -446,12 +509,37 @@ impl<'a> Steps<'a> {
                 self.shaking.insert(name.clone());
                 self.say(format!("shake {name} at {} rpm", number(rpm)))
             }
-            "deactivateShaker" if !self.shaking.remove(&name) => Err("it does not shake".to_owned()),
-            "deactivateShaker" => self.say(format!("stop shaking {name}")),
+            "deactivateShaker" => {
+                let anyway = if self.shaking.contains(&name) { "" } else { ANYWAY };
+                self.say(format!("stop shaking {name}{anyway}"))
+            }
             "openLabwareLatch" => self.say(format!("open latch {name}")),
             "closeLabwareLatch" => self.say(format!("close latch {name}")),
             _ => Err("the language has no such step of this module".to_owned()),
         }
+    }
+
+    /// Sets a module; `volume` is the most that one of its wells holds, uL.
+    fn heat(&mut self, module: &str, celsius: f64, volume: Option<f64>) -> Result<(), String> {
+        self.targets.insert(module.to_owned(), celsius);
+        let volume = volume.filter(|volume| *volume > 0.0).map(|volume| format!("volume: {} uL", number(volume)));
+        let options = words::braced(&volume.into_iter().collect::<Vec<_>>());
+        self.say(format!("heat {module} to {} degC{options}", number(celsius)))
+    }
+
+    /// The temperatures of a profile, each held for its time.
+    fn profile(&mut self, module: &str, command: &Command) -> Result<(), String> {
+        let steps = command.params["profile"].as_array().ok_or("it gives no profile")?;
+        let read = |step: &Value| Some((step["celsius"].as_f64()?, step["holdSeconds"].as_f64()?));
+        let steps: Option<Vec<(f64, f64)>> = steps.iter().map(read).collect();
+        for (celsius, seconds) in steps.ok_or("a step of its profile has no temperature or no time")? {
+            self.heat(module, celsius, command.number("blockMaxVolumeUl"))?;
+            self.say(format!("settle {module}"))?;
+            if seconds > 0.0 {
+                self.say(format!("wait {}", duration(seconds)))?;
+            }
+        }
+        Ok(())
     }
 
     /// What liquids wells hold at the start, by labware and well: volume in uL and name.
@@ -468,6 +556,21 @@ impl<'a> Steps<'a> {
         }
         out
     }
+}
+
+/// How a command moves, where it says so.
+fn ways(command: &Command) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(speed) = command.number("speed") {
+        out.push(format!("speed: {} mm/s", number(speed)));
+    }
+    if command.params["forceDirect"] == true {
+        out.push("direct: true".to_owned());
+    }
+    if let Some(clear) = command.number("minimumZHeight") {
+        out.push(format!("clear: {} mm", number(clear)));
+    }
+    out
 }
 
 /// ` at bottom + 2 mm`, from where the number is round; nothing where that is usual.

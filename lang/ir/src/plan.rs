@@ -168,6 +168,8 @@ pub enum Motion {
         choice: Option<NodeId>,
         /// How far from there, in the axes of the lab, m.
         shift: Option<[NodeId; 3]>,
+        /// How far something hangs below the mover, m, where it says so; else as far as it stops above the frame.
+        hanging: Option<NodeId>,
         /// Along a straight line.
         straight: bool,
         /// The share of the operation's time that the motion takes the place of, s; all of it without.
@@ -329,7 +331,8 @@ impl Motion {
     /// The quantities it depends on, in their order.
     pub fn values(&self) -> Vec<NodeId> {
         match self {
-            Motion::By { shift, .. } | Motion::To { shift: Some(shift), .. } => shift.to_vec(),
+            Motion::By { shift, .. } => shift.to_vec(),
+            Motion::To { shift, hanging, .. } => shift.iter().flatten().copied().chain(*hanging).collect(),
             Motion::Upright { within, .. } => vec![*within],
             Motion::Tilted { angle, shift, within, .. } => {
                 let all = [*angle].into_iter().chain(shift.iter().flatten().copied()).chain(*within);

@@ -14,6 +14,9 @@ pub(super) struct Definition {
     pub(super) title: String,
     /// Outer size left to right, front to back, bottom to top; none where it has no body.
     pub(super) size: Option<[f64; 3]>,
+    /// How far the middle of its body is from the middle of the place that it stands in, to the right and to the back: what is larger
+    /// than a place covers those beside it as well.
+    pub(super) aside: [f64; 2],
     /// Its name space, name and version; none where it does not give them.
     pub(super) uri: Option<String>,
     /// Whether its places are tips.
@@ -25,7 +28,7 @@ pub(super) struct Definition {
 /// A well, a tube or a tip.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Well {
-    /// The middle of its bottom, seen from the middle of the base.
+    /// The middle of its bottom, seen from the middle of the place that the labware stands in.
     pub(super) at: [f64; 3],
     /// From top to bottom.
     pub(super) depth: f64,

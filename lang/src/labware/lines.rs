@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::Span;
 
 use super::definition::{Definition, Opening, Well};
-use crate::ast::{Arg, AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, Grid, Name, Path, UnitText};
+use crate::ast::{Arg, AssetLine, AssetLiteral, At, Expr, ExprKind, Field, FieldValue, Grid, Name, Path, UnitText};
 use crate::eval::lab::grids::Place;
 
 /// Unevenness below which places are evenly spaced, mm: definitions are rounded to hundredths.
@@ -19,8 +19,7 @@ const TIP_END: f64 = 0.2;
 /// The lines a definition stands for, with its text where a robot takes that; all of them point to where its file is named.
 pub(super) fn of(definition: &Definition, text: Option<&str>, at: Span) -> Vec<AssetLine> {
     let write = Writer { definition, at };
-    let mut lines: Vec<AssetLine> =
-        definition.size.map(|size| AssetLine::Field(write.shape("shape", "box", &size))).into_iter().collect();
+    let mut lines: Vec<AssetLine> = definition.size.map(|size| write.body(&size)).into_iter().collect();
     let known_by = definition.uri.clone().map(|uri| write.expr(ExprKind::Text(uri)));
     lines.extend(known_by.map(|uri| AssetLine::Field(write.field("definition", uri))));
     let whole = text.map(|text| write.expr(ExprKind::Text(unbroken(text))));
@@ -172,16 +171,34 @@ impl<'d> Writer<'d> {
         Field { key: self.name(key), value: FieldValue::Expr(value), span: self.at }
     }
 
+    /// Its body: in the middle of its place, or beside that.
+    fn body(&self, size: &[f64; 3]) -> AssetLine {
+        let [x, y] = self.definition.aside;
+        if self.definition.aside == [0.0; 2] {
+            return AssetLine::Field(self.shape("shape", "box", size));
+        }
+        let at = At { position: self.lengths(&[x, y, 0.0]), from: None, turned: None };
+        AssetLine::Solid { shape: self.form("box", self.sizes(size)), at: Some(at) }
+    }
+
     /// `shape: box(x, y, z)`.
     fn shape(&self, field: &str, kind: &str, sizes: &[f64]) -> Field {
-        let args = sizes.iter().map(|s| self.quantity(*s, "mm")).collect();
-        self.call(field, kind, args)
+        self.call(field, kind, self.sizes(sizes))
+    }
+
+    fn sizes(&self, sizes: &[f64]) -> Vec<Expr> {
+        sizes.iter().map(|s| self.quantity(*s, "mm")).collect()
     }
 
     fn call(&self, field: &str, kind: &str, args: Vec<Expr>) -> Field {
+        self.field(field, self.form(kind, args))
+    }
+
+    /// `box(x, y, z)`.
+    fn form(&self, kind: &str, args: Vec<Expr>) -> Expr {
         let args = args.into_iter().map(|value| Arg { name: None, value }).collect();
         let callee = self.expr(ExprKind::Name(self.name(kind)));
-        self.field(field, self.expr(ExprKind::Call(callee, args)))
+        self.expr(ExprKind::Call(callee, args))
     }
 
     /// A tip and the hole it stands in: a cone with a wall, open at both ends, as wide inside at its top as its definition

@@ -7,6 +7,11 @@ use serde::Deserialize;
 use super::definition::{self, Definition, Opening};
 use super::profile::{Profile, Section};
 
+/// The footprint of microplates (ANSI SLAS 1-2004), for which the places of decks are made, and how much larger labware may be that stands in one
+/// place alone, mm.
+const FOOTPRINT: [f64; 2] = [127.76, 85.48];
+const PLAY: f64 = 5.0;
+
 /// A labware definition; lengths in mm, volumes in µL, places measured from the corner at the back left bottom or, in
 /// schema 2, from the front left bottom.
 #[derive(Debug, Deserialize)]
@@ -149,7 +154,8 @@ pub(super) fn read(value: serde_json::Value) -> Result<Definition, String> {
         return Err("it has no wells".into());
     }
     let has_tips = file.parameters.is_tiprack;
-    let definition = Definition { capability, title: file.title(), size, uri: file.uri(), has_tips, wells };
+    let aside = file.aside();
+    let definition = Definition { capability, title: file.title(), size, aside, uri: file.uri(), has_tips, wells };
     definition.checked()
 }
 
@@ -201,8 +207,20 @@ impl File {
         Some([b.x - a.x, a.y - b.y, b.z - a.z])
     }
 
+    /// Labware begins at the front left corner of its place. What is about as large as that is taken to stand in its middle; a bin is a part of its
+    /// robot, which says where it is.
+    fn aside(&self) -> [f64; 2] {
+        let (Some([x, y, _]), 2) = (self.size(), self.schema_version) else { return [0.0; 2] };
+        if self.metadata.display_category == "trash" {
+            return [0.0; 2];
+        }
+        let beyond = [x - FOOTPRINT[0], y - FOOTPRINT[1]];
+        if beyond.iter().any(|over| *over > PLAY) { beyond.map(|over| over / 2.0) } else { [0.0; 2] }
+    }
+
     fn well(&self, well: &Well) -> definition::Well {
         let [x, y, _] = self.size().unwrap_or_default();
+        let [right, rear] = self.aside();
         let back = if self.schema_version == 2 { well.y - y / 2.0 } else { well.y + y / 2.0 };
         let opening = match well.opening {
             Across::Circular { diameter } => Opening::Round(diameter),
@@ -210,7 +228,7 @@ impl File {
         };
         let reach = self.parameters.tip_length.map(|length| length - self.parameters.tip_overlap.unwrap_or(0.0));
         definition::Well {
-            at: [well.x - x / 2.0, back, well.z],
+            at: [well.x - x / 2.0 + right, back + rear, well.z],
             depth: well.depth,
             volume: well.total_liquid_volume,
             opening: Some(opening),

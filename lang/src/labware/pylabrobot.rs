@@ -73,7 +73,7 @@ pub(super) fn read(value: serde_json::Value) -> Result<Definition, String> {
     }
     let title = resource.model.clone().unwrap_or_else(|| resource.name.clone());
     let size = Some([resource.size_x, resource.size_y, resource.size_z]);
-    Definition { capability, title, size, uri: None, has_tips, wells }.checked()
+    Definition { capability, title, size, aside: [0.0; 2], uri: None, has_tips, wells }.checked()
 }
 
 impl Resource {

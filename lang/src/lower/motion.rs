@@ -9,6 +9,9 @@ use crate::ast::{ClauseKind, Expr, Goal, Manner};
 use crate::declare::Type;
 use crate::eval::{Scope, Value};
 
+/// The member of a thing that moves which says how far something hangs below it.
+const HANGING: &str = "hanging";
+
 impl<'a> Planner<'a, '_> {
     /// The motion of a clause; none where it has a mistake, which is reported.
     pub(super) fn motion(&mut self, clause: &'a ClauseKind, scope: &mut Scope) -> Option<Motion> {
@@ -89,7 +92,8 @@ impl<'a> Planner<'a, '_> {
                         (goal, frame, None)
                     }
                 };
-                Some(Motion::To { mover, goal, frame, choice, shift, straight, within })
+                let hanging = self.hanging(mover);
+                Some(Motion::To { mover, goal, frame, choice, shift, hanging, straight, within })
             }
             (_, manner) if within.is_some() && !matches!(manner, Manner::Tilted(..)) => {
                 self.mismatched(within.map_or_else(Span::default, |e| e.span))
@@ -137,6 +141,20 @@ impl<'a> Planner<'a, '_> {
                 let at = self.lab.instances[mover.0 as usize].span;
                 self.mismatched(at)
             }
+        }
+    }
+
+    /// How far something hangs below a thing that moves: its member of that name, if it has one that is a length.
+    fn hanging(&mut self, mover: InstanceId) -> Option<NodeId> {
+        let member = match *self.lab.members_of(mover, HANGING) {
+            [member] => member,
+            _ => return None,
+        };
+        let length = self.lab.tables.units.named("Length");
+        let at = self.lab.instances[mover.0 as usize].span;
+        match self.lab.member_value(mover, member, at) {
+            Value::Num(n) if n.dimension.agrees(&length) => Some(n.node),
+            _ => None,
         }
     }
 

@@ -33,20 +33,23 @@ impl Stage<'_> {
     fn carry_out(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         self.refresh(EFFORT);
         match motion {
-            Motion::To { mover, goal, frame, straight, within, .. } => {
+            Motion::To { mover, goal, frame, shift, straight, within, .. } => {
                 // What has a time of its own and nothing to move with, or nowhere to go, takes that time.
                 let Some(robot) = self.actor_of(*mover) else {
                     return if within.is_some() { Ok(None) } else { Err(Refused::NoRobot) };
                 };
                 self.take(robot, *mover)?;
-                let shift = [0, 1, 2].map(|k| values.get(k).copied().unwrap_or_default());
+                let (shift, hanging) = values.split_at(if shift.is_some() { values.len().min(3) } else { 0 });
+                let shift = [0, 1, 2].map(|k| shift.get(k).copied().unwrap_or_default());
+                // What does not say how far something hangs below it is taken to stop short for that.
+                let hanging = hanging.first().copied().unwrap_or(shift[2].max(0.0));
                 let gantry = self.actors.get(&robot).is_some_and(Actor::is_gantry);
                 if gantry || within.is_some() {
                     let to = shifted(targets(self, robot, *goal, frame), shift);
                     match to.is_empty() {
                         true if within.is_some() => return Ok(None),
                         true => return Err(Refused::NoFrame),
-                        false if gantry => return self.cross(robot, &to, *goal, shift[2].max(0.0)).map(Some),
+                        false if gantry => return self.cross(robot, &to, *goal, hanging).map(Some),
                         false => {}
                     }
                 }
