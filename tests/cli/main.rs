@@ -1,6 +1,7 @@
 //! The command from outside: what is typed, what comes back, what is left on disk.
 
 mod along;
+mod aqueous;
 mod beforehand;
 mod beginnings;
 mod bill;

@@ -127,11 +127,11 @@ workflow feed in bench {{
 fn solids_that_come_out_are_told_where_they_do() {
     let [salt, silver] = ["100 g of water + 1 mmol of NaCl", "10 g of water + 2 mmol of AgNO3"];
     let told = findings_of("precipitate", salt, silver, "    deliver 2 mL by burette");
-    assert!(told.contains("AgCl precipitates in `cup`: 395"), "{told}");
+    assert!(told.contains("`cup` holds precipitated AgCl: 395"), "{told}");
     assert!(told.contains("solid AgCl may block `pump`"), "{told}");
     // What is put in as a solid has not come out, but blocks a line all the same.
     let slurry = findings_of("slurry", "100 g of water + 1 mmol of AgCl", "10 g of water", "    wait 1 s");
-    assert!(!slurry.contains("precipitates in `cup`") && slurry.contains("solid AgCl may block `pump`"), "{slurry}");
+    assert!(!slurry.contains("`cup` holds precipitated") && slurry.contains("solid AgCl may block `pump`"), "{slurry}");
     let steps = "    deliver 2 mL by burette";
     let clear = findings_of("no_precipitate", salt, "10 g of water + 2 mmol of KNO3", steps);
     assert!(clear.contains("no findings"), "{clear}");

@@ -198,7 +198,7 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// What stands after `of`: a value or several, and for a concentration every kind of it that anything asks for.
+    /// What stands after `of`: a value or several, for a concentration every kind of it that anything asks for, or a thing as it is at the start.
     fn all_watched(&mut self, of: &'a Expr, scope: &mut Scope) -> Vec<(Watched, Option<Dimension>)> {
         let mut out = Vec::new();
         for e in several(of) {
@@ -208,6 +208,7 @@ impl<'a> Elaborator<'a> {
             match self.expr(e, scope) {
                 Value::Num(Num { node, dimension, .. }) => out.push((self.watched(e, node), Some(dimension))),
                 Value::Bool(node) => out.push((self.watched(e, node), None)),
+                Value::Instance(id) => out.push((Watched::Given(self.declared_contents(id)), None)),
                 Value::Concentration(m, s) => {
                     let kinds = self.view_values.get(&(m, s)).into_iter().flat_map(BTreeMap::values);
                     out.extend(kinds.filter_map(|kind| match kind {
@@ -219,6 +220,11 @@ impl<'a> Elaborator<'a> {
             }
         }
         out
+    }
+
+    /// Where the lab says what a mixture holds at the start, if it does.
+    fn declared_contents(&self, mixture: InstanceId) -> Option<Span> {
+        self.held.iter().find(|held| held.mixture == Some(mixture)).map(|held| held.span)
     }
 
     /// Where a value is looked at: one that nothing changes at the start, where it is given.

@@ -1,0 +1,115 @@
+//! Findings on what solutions in water cannot hold: gas beyond its solubility, charges without a counterion, heat beyond boiling, a pH without water.
+
+use crate::harness::{flat, folder, matterixc_in, write};
+
+/// What `check` says where one beaker is poured into another.
+fn poured(name: &str, uses: &str, from: &str, into: &str, then: &str) -> String {
+    let dir = folder(name);
+    let text = format!(
+        "mtx 1
+{uses}use std::glassware::Beaker250mL
+extern skill pour(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 s
+    effect move(m, from: source, to: target)
+lab bench {{
+    ambient: 25 degC
+    flask = Beaker250mL at (0, 0, 0) m holding {from}
+    cup = Beaker250mL at (1, 0, 0) m holding {into}
+}}
+workflow go in bench {{
+    pour 25 g from flask into cup
+    wait 1 s
+{then}
+}}
+"
+    );
+    write(&dir, "cup.mtx", text);
+    flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out)
+}
+
+const EQUILIBRIA: &str = "use std::equilibria\n";
+
+#[test]
+fn weak_acids_and_solids_set_gas_free_as_well() {
+    let soda = "50 g of water + 30 mmol of NaHCO3";
+    // With equilibria by what is there at equilibrium, else by the acid that is there.
+    for (uses, code) in [(EQUILIBRIA, "gas-leaves"), ("", "gas-stays")] {
+        let vinegar = poured("vinegar", uses, "50 g of water + 40 mmol of acetic_acid", soda, "");
+        assert!(vinegar.contains(code), "{vinegar}");
+        let trace = poured("little_vinegar", uses, "50 g of water + 1 mmol of acetic_acid", soda, "");
+        assert!(!trace.contains("gas"), "{trace}");
+    }
+    let acid = "50 g of water + 40 mmol of HCl";
+    let solids = "use std::equilibria\nuse std::solids\nuse std::solids::FeS(s)\n";
+    let chalk = poured("chalk", solids, acid, "50 g of water + 20 mmol of CaCO3", "");
+    assert!(chalk.contains("`cup` gets more CO2 than stays dissolved"), "{chalk}");
+    let sulfide = poured("iron_sulfide", solids, acid, "50 g of water + 20 mmol of FeS(s)", "");
+    assert!(sulfide.contains("more H2S than stays") && sulfide.contains("toxic gas"), "{sulfide}");
+    let hydrosulfide = poured("hydrosulfide", EQUILIBRIA, acid, "50 g of water + 20 mmol of HS- + 20 mmol of Na+", "");
+    assert!(hydrosulfide.contains("incompatible-mix"), "{hydrosulfide}");
+    let cyanide = poured(
+        "cyanide",
+        EQUILIBRIA,
+        "50 g of water",
+        "50 g of water + 1 mmol of NaCN",
+        "    note \"{cup.contents.ph}\"",
+    );
+    assert!(!cyanide.contains("ignores NaCN"), "{cyanide}");
+    // With a gas the pressure is known, and another caution has it.
+    let gases = poured("vinegar_with_gases", "use std::gases\n", "50 g of water + 40 mmol of acetic_acid", soda, "");
+    assert!(gases.contains("gas-bubbles-off") && !gases.contains("gas-leaves"), "{gases}");
+}
+
+#[test]
+fn declared_charges_balance() {
+    let of = |name: &str, into: &str| poured(name, EQUILIBRIA, "50 g of water", into, "");
+    let lone = of("lone_acetate", "50 g of water + 10 mmol of acetate");
+    assert!(
+        lone.contains("charges declared in `cup` do not balance: positive less negative ones are -10.000 mmol"),
+        "{lone}"
+    );
+    let phosphate = of("short_of_sodium", "50 g of water + 10 mmol of PO4^3- + 20 mmol of Na+");
+    assert!(phosphate.contains("-10.000 mmol"), "{phosphate}");
+    for whole in ["10 mmol of acetate + 10 mmol of Na+", "10 mmol of CH3COONa", "10 mmol of PO4^3- + 30 mmol of Na+"] {
+        let said = of("balanced", &format!("50 g of water + {whole}"));
+        assert!(!said.contains("do not balance"), "{said}");
+    }
+}
+
+#[test]
+fn mixing_that_boils_is_told() {
+    let acid = "30 g of H2SO4";
+    let strong = poured("boiling_acid", "", acid, "25 g of water", "");
+    assert!(
+        strong.contains("`cup` would warm to about 144 degC") && strong.contains("and boil if no heat escapes"),
+        "{strong}"
+    );
+    let hot = poured("hot_acid", "", acid, "150 g of water at 25 degC", "");
+    assert!(hot.contains("hot-mixing") && !hot.contains("boil if"), "{hot}");
+    // Little heat is enough where little is missing.
+    let nearly = poured("nearly_boiling", "", acid, "200 g of water at 90 degC", "");
+    assert!(nearly.contains("and boil if no heat escapes"), "{nearly}");
+}
+
+#[test]
+fn a_ph_without_water_is_told_of_the_vessel_that_has_none() {
+    let then = "    note \"{flask.contents.ph :.2} {cup.contents.ph :.2}\"";
+    let dry = poured("dry", EQUILIBRIA, "30 g of acetone", "30 g of ethanol", then);
+    assert!(dry.contains("the pH of `flask` is used") && dry.contains("the pH of `cup` is used"), "{dry}");
+    let one = poured("one_dry", EQUILIBRIA, "30 g of acetone", "30 g of ethanol", "    note \"{cup.contents.ph :.2}\"");
+    assert!(!one.contains("the pH of `flask`"), "{one}");
+}
+
+#[test]
+fn heat_of_what_dissolves_whole_is_told_by_its_name() {
+    let then = "    expect cup.contents.temperature < 30 degC";
+    let urea = poured("urea", EQUILIBRIA, "30 g of urea", "100 g of water", then);
+    assert!(
+        urea.contains("ignores the heat of dissolving urea: about -1") && !urea.contains("neutralisation"),
+        "{urea}"
+    );
+    let pack = poured("cold_pack", EQUILIBRIA, "30 g of NH4Cl", "100 g of water", then);
+    assert!(pack.contains("takes the heat of diluting NH4+ from another ion"), "{pack}");
+    let thin = poured("thin", EQUILIBRIA, "100 g of water + 10 mmol of NH4Cl", "100 g of water", then);
+    assert!(!thin.contains("another ion"), "{thin}");
+}
