@@ -137,7 +137,7 @@ fn a_vessel_that_is_closed_to_gases_is_warned_of() {
         ("use std::gases", "", acid, "gases would bubble out of `cup`"),
         ("use std::gases", "", "100 g of water + 2 mmol of CO2", ""),
         ("use std::gases", OPEN, acid, ""),
-        ("use std::equilibria", "", acid, "acid releases gas from HCO3-"),
+        ("use std::equilibria", "", acid, "gets more CO2 than stays dissolved"),
         ("use std::equilibria", "", "100 g of water + 10 mmol of CO2", "gets more CO2 than stays dissolved"),
         ("use std::gases", OPEN, "100 g of water + 500 mmol of NH3", "too much NH3(g) for Henry's law"),
         ("use std::gases", OPEN, "100 g of water at 70 degC", "the solubility of H2S(g) is unknown"),
