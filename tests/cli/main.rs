@@ -63,6 +63,7 @@ mod reached;
 mod reacting;
 mod recorded;
 mod reference;
+mod rewritten;
 mod science;
 mod screening;
 mod servers;
