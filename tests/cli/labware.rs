@@ -250,27 +250,36 @@ fn liquids_stand_as_high_as_the_inside_has_it() {
 }
 
 #[test]
-fn wells_on_an_adapter_on_a_heater_stay_cold() {
+fn modules_heat_wells_through_adapters_and_blocks_but_not_in_racks() {
     let dir = folder("labware_adapters");
     let text = "mtx 1
 use std::opentrons
 asset Flat from labware \"opentrons_universal_flat_adapter\"
+asset Tubes from labware \"opentrons_24_aluminumblock_nest_2ml_screwcap\"
+asset Rack from labware \"opentrons_24_tuberack_nest_2ml_screwcap\"
 lab deck {
     ambient: 22 degC
     ot2 = OT2 at (0, 0, 0) m
     shaker = HeaterShaker on ot2.slot[1]
-    adapter = Flat on shaker
-    plate = Corning96 on adapter holding { A1: 100 uL of water }
+    HOLDER
 }
 workflow w in deck {
     close latch shaker
     heat shaker to 60 degC
-    wait 10 min
+    wait 40 min
+    expect WELL.contents.temperature in 58 degC .. 60.5 degC
     stop heating shaker
-    expect plate[A1].contents.temperature > 50 degC
 }
 ";
-    write(&dir, "bench.mtx", text);
-    let ended = matterixc_in(&dir, &["check", "bench.mtx", "--format", "json"]);
-    assert!(ended.out_lines().iter().any(|line| line["code"] == "wells-stay-cold"), "{}", ended.out);
+    for (holder, well, cold) in [
+        ("adapter = Flat on shaker, plate = Corning96 on adapter holding { A1: 100 uL of water }", "plate[A1]", false),
+        ("block = Tubes on shaker holding { A1: 1 mL of water }", "block[A1]", false),
+        ("rack = Rack on shaker holding { A1: 1 mL of water }", "rack[A1]", true),
+    ] {
+        write(&dir, "bench.mtx", text.replace("HOLDER", holder).replace("WELL", well));
+        let checked = matterixc_in(&dir, &["check", "bench.mtx", "--no-cache"]);
+        assert_eq!(checked.out.contains("wells-stay-cold"), cold, "{well}: {}", checked.out);
+        let ran = matterixc_in(&dir, &["run", "bench.mtx"]);
+        assert_eq!(ran.code, i32::from(cold), "{well}: {}{}", ran.out, ran.err);
+    }
 }
