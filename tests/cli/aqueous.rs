@@ -113,3 +113,74 @@ fn heat_of_what_dissolves_whole_is_told_by_its_name() {
     let thin = poured("thin", EQUILIBRIA, "100 g of water + 10 mmol of NH4Cl", "100 g of water", then);
     assert!(!thin.contains("another ion"), "{thin}");
 }
+
+/// What `check` and `run` say of a lab with these lines, and a note of these values.
+fn looked_at(name: &str, uses: &str, lines: &str, values: &str) -> (String, String) {
+    let dir = folder(name);
+    let text = format!(
+        "mtx 1
+use std::equilibria
+{uses}
+use std::glassware::Beaker250mL
+lab bench {{
+    ambient: 25 degC
+{lines}
+}}
+workflow look in bench {{
+    wait 1 s
+    note \"found {values}\"
+}}
+"
+    );
+    write(&dir, "cup.mtx", text);
+    let checked = flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out);
+    (checked, flat(&matterixc_in(&dir, &["run", "cup.mtx"]).out))
+}
+
+/// By the law of Davies at 0.1 and 0.3 mol/kg: -log10 of 0.1 x 10^-0.107 and of 0.1 x 10^-0.538.
+#[test]
+fn electrodes_read_ions_that_take_part_in_no_equilibrium() {
+    let uses = "use std::electrodes::{CalciumMembrane, SilverBillet}";
+    let lines = "    nitrate = Beaker250mL at (0, 0, 0) m holding 100 g of water + 10 mmol of AgNO3
+    chloride = Beaker250mL at (1, 0, 0) m holding 100 g of water + 10 mmol of Ca2+ + 20 mmol of Cl-
+    salt = Beaker250mL at (2, 0, 0) m holding 100 g of water + 10 mmol of NaCl
+    silver = SilverBillet { probes: nitrate } at (0, 1, 0) m
+    calcium = CalciumMembrane { probes: chloride } at (1, 1, 0) m
+    blind = CalciumMembrane { probes: salt } at (2, 1, 0) m";
+    let (said, ran) =
+        looked_at("ions_alone", uses, lines, "{silver.sensed :.3} {calcium.sensed :.3} {blind.shown :.1}");
+    assert!(ran.contains("found 1.107 1.538"), "{ran}");
+    assert!(said.contains("`blind` senses nothing in `salt`") && !said.contains("`silver` senses"), "{said}");
+}
+
+#[test]
+fn constants_that_do_not_follow_the_temperature_hold_near_25_degc() {
+    let uses = "use std::acids\nuse std::complexes\nuse std::metals";
+    for (celsius, told) in [(25, false), (34, false), (37, true)] {
+        let lines = format!(
+            "    amine = Beaker250mL at (0, 0, 0) m holding 100 g of water + 5 mmol of piperidine + 2 mmol of HCl at {celsius} degC
+    silver = Beaker250mL at (1, 0, 0) m holding 100 g of water + 1 mmol of AgNO3 + 5 mmol of NH3 at {celsius} degC"
+        );
+        let values = "{amine.contents.ph} {silver.contents.ph}";
+        let (said, _) = looked_at("windows", uses, &lines, values);
+        for of in ["piperidinium", "AgNH3+"] {
+            assert_eq!(said.contains(&format!("an equilibrium of {of} has no constant")), told, "{celsius}: {said}");
+        }
+    }
+}
+
+#[test]
+fn pairs_of_ions_and_other_laws_are_told_where_solids_are() {
+    let gypsum = "    cup = Beaker250mL at (0, 0, 0) m holding 100 g of water + 5 mmol of CaSO4";
+    let (alone, _) = looked_at("pairs_left_out", "use std::solids", gypsum, "{cup.contents.ph}");
+    assert!(alone.contains("pairs of the ions of gypsum are left out in `cup`"), "{alone}");
+    let (paired, _) = looked_at("pairs", "use std::solids\nuse std::complexes", gypsum, "{cup.contents.ph}");
+    assert!(!paired.contains("pairs of the ions"), "{paired}");
+    let sulfate = "    cup = Cup at (0, 0, 0) m holding 100 g of water + 50 mmol of potassium_sulfate";
+    for (law, told) in [("davies", true), ("pitzer", false)] {
+        let uses =
+            format!("use std::brines\nuse std::salts\nasset Cup: Beaker250mL {{ contents: {{ activities: {law} }} }}");
+        let (said, _) = looked_at("brines_by_law", &uses, sulfate, "{cup.contents.ph}");
+        assert_eq!(said.contains("hold with `activities: pitzer` only"), told, "{law}: {said}");
+    }
+}

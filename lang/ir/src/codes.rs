@@ -127,6 +127,7 @@ codes! {
     HEAT_OF_STRONG_SOLUTION "heat-of-strong-solution" "H3" "the temperature of a concentrated solution with unknown heat capacity is used";
     VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution with unknown density is measured out by volume";
     HEAT_LEFT_OUT "heat-left-out" "H3" "a temperature is used after a step whose heat the model ignores";
+    BOILING_BY_MIXING "boiling-by-mixing" "H3" "a mixture would boil by the heat of mixing";
     HOT_MIXING "hot-mixing" "H3" "dissolving, diluting or neutralising makes a mixture hot";
     WATER_INTO_ACID "water-into-acid" "H3" "water is poured into a strong acid, which gets hot";
     WELLS_STAY_COLD "wells-stay-cold" "H3" "a heater warms labware whose wells do not heat up in the model";
