@@ -2,7 +2,7 @@
 
 use matterix_ir::listing::joined;
 use matterix_lang::labware::library::{self, Missing};
-use matterix_lang::labware::{Listed, listed};
+use matterix_lang::labware::{Listed, Shape, listed};
 use serde_json::{Value, json};
 
 use crate::Exit;
@@ -68,7 +68,11 @@ fn missing(name: &str) -> Exit {
 
 fn page(one: &Listed) -> String {
     let versions: Vec<String> = one.versions.iter().map(u32::to_string).collect();
-    let inside = if one.short.has_inside { "by sections" } else { "straight, as wide as its opening" };
+    let inside = match one.short.shape {
+        Shape::Sections => "by sections",
+        Shape::Bottom => "by its bottom and its volume: an estimate",
+        Shape::Straight => "straight, as wide as its opening",
+    };
     let mut out = format!("{}\n", one.name);
     let mut line = |name: &str, value: &str| out += &format!("  {name:10}{value}\n");
     if !one.short.title.is_empty() {
@@ -96,6 +100,6 @@ fn object(one: &Listed) -> Value {
         one.short.places.iter().map(|(count, ul)| json!({ "count": count, "volume": ul })).collect();
     json!({
         "name": one.name, "version": one.version, "versions": one.versions, "title": one.short.title,
-        "kind": one.short.capability, "places": places, "sections": one.short.has_inside,
+        "kind": one.short.capability, "places": places, "sections": one.short.shape == Shape::Sections,
     })
 }

@@ -81,8 +81,13 @@ fn a_name_has_a_page() {
         let name = page.lines().next().expect("a name");
         assert_eq!(asked(&[name]), *page);
     }
+    // An older version has the sections of the newest; without any the bottom says how the inside is.
     let older = asked(&["opentrons/biorad_96_wellplate_200ul_pcr/1"]);
-    assert!(older.contains("straight, as wide as its opening"), "{older}");
+    assert!(older.contains("inside    by sections"), "{older}");
+    let block = asked(&["opentrons_96_aluminumblock_biorad_wellplate_200ul"]);
+    assert!(block.contains("inside    by its bottom and its volume: an estimate"), "{block}");
+    let flat = asked(&["milliplex_r_96_well_microtiter_plate"]);
+    assert!(flat.contains("straight, as wide as its opening"), "{flat}");
     assert!(older.ends_with("asset NAME from labware \"biorad_96_wellplate_200ul_pcr/1\"\n"), "{older}");
 }
 

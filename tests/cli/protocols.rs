@@ -740,3 +740,96 @@ workflow go in deck {{
         assert!(code == 0 || checked.out.contains("and this adds"), "{}", checked.out);
     }
 }
+
+/// A pipette over a flat plate and a trough, and a workflow of these steps.
+fn bench_of(steps: &str) -> String {
+    format!(
+        "mtx 1
+use std::opentrons::{{Corning96, OT2, P300Single, Reservoir12, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Single }} at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[5]
+    plate = Corning96 on ot2.slot[1] holding {{ H1: 100 uL of water }}
+    stock = Reservoir12 on ot2.slot[2] holding {{ A1: 10 mL of water }}
+}}
+workflow go in deck {{
+    pick up tip from tips by ot2.left
+{steps}    drop tip by ot2.left
+}}
+"
+    )
+}
+
+#[test]
+fn air_is_taken_above_a_liquid_and_comes_out_in_its_place() {
+    let dir = folder("air_in_its_place");
+    let above = "    move ot2.left to stock[A1] at top + 5 mm\n";
+    let aspirate = "    aspirate 100 uL from stock[A1] by ot2.left\n";
+    let gap = "    air gap 20 uL by ot2.left\n";
+    // In a liquid, or at its rack, a pipette takes up no air.
+    for steps in [format!("{aspirate}{gap}"), gap.to_owned()] {
+        write(&dir, "a.mtx", bench_of(&steps));
+        let checked = matterixc_in(&dir, &["check", "a.mtx", "--no-cache"]);
+        assert!(checked.code == 1 && checked.out.contains("air gap 20 uL"), "{steps}: {}", checked.out);
+    }
+    // Air behind the liquid comes last, air at the end of the tip first; between two portions it counts as behind both.
+    let dispense = |volume: u32| format!("    dispense {volume} uL into plate[A1] by ot2.left\n");
+    for (steps, given) in [
+        (format!("{above}{gap}{aspirate}{}", dispense(60)), 60),
+        (format!("{aspirate}{above}{gap}{}", dispense(60)), 40),
+        (format!("{aspirate}{above}{gap}{aspirate}{}", dispense(100)), 100),
+        (format!("{above}{gap}{aspirate}{}{}", dispense(60), dispense(60)), 100),
+    ] {
+        let expect = format!("    expect plate[A1].contents.volume in {given} uL - 0.1 uL .. {given} uL + 0.1 uL\n");
+        write(&dir, "a.mtx", bench_of(&format!("{steps}{expect}")));
+        let ran = matterixc_in(&dir, &["run", "a.mtx"]);
+        assert_eq!(ran.code, 0, "{steps}: {}{}", ran.out, ran.err);
+        let checked = matterixc_in(&dir, &["check", "a.mtx", "--no-cache"]);
+        assert_eq!(checked.code, 0, "{steps}: {}", checked.out);
+    }
+}
+
+#[test]
+fn a_tip_that_the_liquid_leaves_behind_is_told() {
+    let dir = folder("left_behind");
+    let said = |volume: u32, at: &str, options: &str| {
+        let steps = format!(
+            "    aspirate {volume} uL from plate[H1] at bottom + {at} by ot2.left {options}\n    dispense {volume} uL into plate[A1] by ot2.left\n"
+        );
+        write(&dir, "a.mtx", bench_of(&steps));
+        flat(&matterixc_in(&dir, &["check", "a.mtx", "--no-cache"]).out)
+    };
+    let falls = said(80, "2 mm", "");
+    assert!(falls.contains("falls below the tip, which is 2 mm above the bottom: only 35.7 uL of 80 uL"), "{falls}");
+    assert!(said(50, "1 mm", "").contains("no findings"));
+    for options in ["", "{ partial: true }"] {
+        assert!(said(80, "5 mm", options).contains("it aspirates air"), "{options}");
+    }
+}
+
+#[test]
+fn transfers_have_heights_rates_air_and_touches() {
+    let dir = folder("transfer_options");
+    let options = "{ tips: held, mix_before: 1, mix_volume: 50 uL, take_at: 2 mm, give_at: 3 mm, rate: 20 uL/s, rate_out: 30 uL/s, air_gap: 10 uL, touch_tip: true }";
+    write(&dir, "a.mtx", bench_of(&format!("    transfer 60 uL from stock[A1] to plate[A1] by ot2.left {options}\n")));
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert_eq!(emitted.code, 0, "{}", emitted.err);
+    for line in [
+        "aspirate(50, stock[\"A1\"].bottom(2))",
+        "aspirate(60, stock[\"A1\"].bottom(2))",
+        "aspirate(10)",
+        "dispense(70, plate[\"A1\"].top(-7.67))",
+        "flow_rate.aspirate = 20",
+        "flow_rate.dispense = 30",
+        "touch_tip(",
+    ] {
+        assert!(emitted.out.contains(line), "{line}: {}", emitted.out);
+    }
+    // With `split` the air takes its place in the tip.
+    let steps =
+        "    transfer 300 uL from stock[A1] to plate[A1] by ot2.left { tips: held, split: true, air_gap: 10 uL }\n";
+    write(&dir, "b.mtx", bench_of(steps));
+    let emitted = matterixc_in(&dir, &["emit", "b.mtx", "--target", "opentrons-python"]);
+    assert_eq!(emitted.out.matches("aspirate(150, stock").count(), 2, "{}{}", emitted.out, emitted.err);
+}

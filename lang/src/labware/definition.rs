@@ -25,6 +25,18 @@ pub(super) struct Definition {
     pub(super) wells: BTreeMap<String, Well>,
 }
 
+/// How the inside of wells is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Shape {
+    /// It is taken to be straight, as wide as its opening.
+    #[default]
+    Straight,
+    /// By the form of its bottom and its volume: an estimate.
+    Bottom,
+    /// By sections.
+    Sections,
+}
+
 /// A well, a tube or a tip.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Well {
@@ -38,6 +50,8 @@ pub(super) struct Well {
     pub(super) opening: Option<Opening>,
     /// Its inside, if that is known.
     pub(super) inside: Option<Profile>,
+    /// How that is known.
+    pub(super) shape: Shape,
     /// How far the end of a tip is below the nozzle that has it.
     pub(super) reach: Option<f64>,
 }

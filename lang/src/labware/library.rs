@@ -12,6 +12,9 @@ use crate::near::nearest;
 const PACKED: &[u8] = include_bytes!("../../../assets/labware/opentrons.bin");
 
 /// The name space of these definitions.
+pub(super) const NAMESPACE: &str = "opentrons";
+
+/// The same before a name.
 const SPACE: &str = "opentrons/";
 
 /// A definition of the library.

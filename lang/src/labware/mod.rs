@@ -15,6 +15,7 @@ mod pylabrobot;
 use crate::ast::{AssetLine, Name, Path};
 
 use definition::Definition;
+pub use definition::Shape;
 
 /// The lines that a file stands for and the capability it has, or what is wrong with it.
 pub(crate) fn lines(text: &str, path: &Name) -> Result<(Vec<AssetLine>, Option<Path>), String> {
@@ -39,8 +40,8 @@ pub struct Summary {
     pub capability: &'static str,
     /// Its places: their number and the volume of each, µL, one entry for each volume, the smallest first.
     pub places: Vec<(usize, f64)>,
-    /// Whether the inside of its wells is known beyond their opening and depth.
-    pub has_inside: bool,
+    /// How the inside of its wells is known, of the one that is known best.
+    pub shape: Shape,
 }
 
 impl Summary {
@@ -103,6 +104,6 @@ pub fn summary(text: &str) -> Result<Summary, String> {
         }
     }
     places.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let has_inside = definition.wells.values().any(|well| well.inside.is_some());
-    Ok(Summary { title: definition.title, capability: definition.capability, places, has_inside })
+    let shape = definition.wells.values().map(|well| well.shape).max().unwrap_or_default();
+    Ok(Summary { title: definition.title, capability: definition.capability, places, shape })
 }

@@ -1,10 +1,12 @@
 //! Labware definitions of Opentrons, schema 2 and 3.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use serde::Deserialize;
 
-use super::definition::{self, Definition, Opening};
+use super::definition::{self, Definition, Opening, Shape};
+use super::library;
 use super::profile::{Profile, Section};
 
 /// The footprint of microplates (ANSI SLAS 1-2004), for which the places of decks are made, and how much larger labware may be that stands in one
@@ -31,6 +33,37 @@ struct File {
     allowed_roles: Vec<String>,
     #[serde(default)]
     inner_labware_geometry: BTreeMap<String, Geometry>,
+    #[serde(default)]
+    groups: Vec<Group>,
+}
+
+/// Wells of one kind.
+#[derive(Debug, Deserialize)]
+struct Group {
+    #[serde(default)]
+    wells: Vec<String>,
+    #[serde(default)]
+    metadata: Kind,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Kind {
+    well_bottom_shape: Option<String>,
+}
+
+/// What a version of a definition says of the inside of its wells.
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct Insides {
+    wells: BTreeMap<String, Inside>,
+    inner_labware_geometry: BTreeMap<String, Geometry>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Inside {
+    geometry_definition_id: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -143,13 +176,18 @@ pub(super) fn read(value: serde_json::Value) -> Result<Definition, String> {
     }
     let file: File = serde_json::from_value(value).map_err(|e| e.to_string())?;
     let capability = file.capability();
+    let newer = file.newer_insides();
     // A lid stack stands for the lids on it: it has no body of its own.
     let size = file.size().filter(|_| file.metadata.display_category != "system");
     if size.is_none() && file.metadata.display_category != "system" {
         return Err("it has no outer dimensions".into());
     }
-    let wells: BTreeMap<String, definition::Well> =
-        file.wells.iter().filter(|(_, well)| !file.is_seat(well)).map(|(n, w)| (n.clone(), file.well(w))).collect();
+    let wells: BTreeMap<String, definition::Well> = file
+        .wells
+        .iter()
+        .filter(|(_, well)| !file.is_seat(well))
+        .map(|(n, w)| (n.clone(), file.well(n, w, &newer)))
+        .collect();
     if wells.is_empty() && !file.may_be_without_wells() {
         return Err("it has no wells".into());
     }
@@ -218,7 +256,7 @@ impl File {
         if beyond.iter().any(|over| *over > PLAY) { beyond.map(|over| over / 2.0) } else { [0.0; 2] }
     }
 
-    fn well(&self, well: &Well) -> definition::Well {
+    fn well(&self, name: &str, well: &Well, newer: &Insides) -> definition::Well {
         let [x, y, _] = self.size().unwrap_or_default();
         let [right, rear] = self.aside();
         let back = if self.schema_version == 2 { well.y - y / 2.0 } else { well.y + y / 2.0 };
@@ -226,24 +264,76 @@ impl File {
             Across::Circular { diameter } => Opening::Round(diameter),
             Across::Rectangular { x_dimension, y_dimension } => Opening::Square([x_dimension, y_dimension]),
         };
+        let by_sections =
+            self.inside(well).or_else(|| self.newer_inside(name, well, newer)).map(|inside| (inside, Shape::Sections));
+        let by_bottom = || self.inside_by_bottom(name, well).map(|inside| (inside, Shape::Bottom));
+        let (inside, shape) =
+            by_sections.or_else(by_bottom).map_or((None, Shape::Straight), |(inside, shape)| (Some(inside), shape));
         let reach = self.parameters.tip_length.map(|length| length - self.parameters.tip_overlap.unwrap_or(0.0));
         definition::Well {
             at: [well.x - x / 2.0 + right, back + rear, well.z],
             depth: well.depth,
             volume: well.total_liquid_volume,
             opening: Some(opening),
-            inside: self.inside(well),
+            inside,
+            shape,
             reach: reach.filter(|reach| self.parameters.is_tiprack && *reach > 0.0),
         }
     }
 
     /// The inside of a well, where its sections are known and as round or square as its opening.
     fn inside(&self, well: &Well) -> Option<Profile> {
-        let sections = &self.inner_labware_geometry.get(well.geometry_definition_id.as_ref()?)?.sections;
-        let is_round = matches!(well.opening, Across::Circular { .. });
-        let sections: Option<Vec<Section>> = sections.iter().map(|part| part.section(is_round)).collect();
-        Profile::of(sections?, well.depth, well.total_liquid_volume)
+        made_of(self.inner_labware_geometry.get(well.geometry_definition_id.as_ref()?)?, well)
     }
+
+    /// What the newest version of the library says of the wells, where this version of the same labware has no sections.
+    fn newer_insides(&self) -> Insides {
+        if !self.inner_labware_geometry.is_empty() || self.namespace != library::NAMESPACE {
+            return Insides::default();
+        }
+        let newest = library::find(&self.parameters.load_name).ok().and_then(|entry| entry.text().ok());
+        newest.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
+    }
+
+    /// The inside of a well in that version.
+    fn newer_inside(&self, name: &str, well: &Well, newer: &Insides) -> Option<Profile> {
+        let id = newer.wells.get(name)?.geometry_definition_id.as_ref()?;
+        made_of(newer.inner_labware_geometry.get(id)?, well)
+    }
+
+    /// The inside of a round well with a round or a pointed bottom, of which no sections are known: half a sphere, or a cone that is as high as the
+    /// volume says, with straight walls above.
+    fn inside_by_bottom(&self, name: &str, well: &Well) -> Option<Profile> {
+        let Across::Circular { diameter } = well.opening else { return None };
+        let group = self.groups.iter().find(|group| group.wells.iter().any(|n| n == name))?;
+        let (radius, depth) = (diameter / 2.0, well.depth);
+        let area = PI * radius * radius;
+        let (bottom, height) = match group.metadata.well_bottom_shape.as_deref()? {
+            "u" if depth > radius => (Section::Cap(radius, [0.0, radius]), radius),
+            "v" => {
+                // What a cylinder would hold beyond the volume is two thirds of that around the cone.
+                let height = (1.5 * (depth - well.total_liquid_volume / area)).clamp(0.0, depth);
+                (Section::Cone([[0.0, 0.0], [radius, height]]), height)
+            }
+            _ => return None,
+        };
+        let above = Section::Cone([[radius, height], [radius, depth]]);
+        let sections = if height <= 0.0 {
+            vec![above]
+        } else if height >= depth {
+            vec![bottom]
+        } else {
+            vec![bottom, above]
+        };
+        Profile::of(sections, depth, well.total_liquid_volume)
+    }
+}
+
+/// The inside that sections make of a well.
+fn made_of(geometry: &Geometry, well: &Well) -> Option<Profile> {
+    let is_round = matches!(well.opening, Across::Circular { .. });
+    let sections: Option<Vec<Section>> = geometry.sections.iter().map(|part| part.section(is_round)).collect();
+    Profile::of(sections?, well.depth, well.total_liquid_volume)
 }
 
 impl Part {
@@ -263,5 +353,37 @@ impl Part {
             Form::Spherical if is_round && count == 1.0 => Some(Section::Cap(self.radius_of_curvature?, [low, high])),
             _ => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tube 10 mm across and 40 mm deep of this volume and bottom, by hand: a cone or half a sphere below a cylinder.
+    fn inside(bottom: &str, volume: f64) -> Option<Profile> {
+        let definition = serde_json::json!({
+            "schemaVersion": 2, "metadata": { "displayCategory": "tubeRack" },
+            "parameters": { "isTiprack": false, "loadName": "of_my_own" }, "namespace": "custom", "version": 1,
+            "dimensions": { "xDimension": 127.76, "yDimension": 85.48, "zDimension": 50.0 },
+            "wells": { "A1": { "shape": "circular", "diameter": 10.0, "depth": 40.0, "totalLiquidVolume": volume, "x": 50.0, "y": 40.0, "z": 5.0 } },
+            "groups": [{ "wells": ["A1"], "metadata": { "wellBottomShape": bottom } }],
+        });
+        read(definition).expect("it is a definition").wells["A1"].inside.clone()
+    }
+
+    #[test]
+    fn bottoms_say_how_a_well_without_sections_is_inside() {
+        // 78.54 mm2 x 40 mm are 3141.6 uL: a cone of 18.02 mm leaves out two thirds of what stands around it.
+        let cone = inside("v", 2198.0).expect("it is known");
+        assert!((cone.volume() - 2198.0).abs() < 1.0 && cone.points().len() == 3, "{cone:?}");
+        assert!((cone.points()[1][1] - 18.02).abs() < 0.01, "{cone:?}");
+        // Half a sphere of 5 mm: 261.8 uL, and 35 mm of cylinder.
+        let round = inside("u", 3000.0).expect("it is known");
+        assert!((round.volume() - (261.8 + 2748.9)).abs() < 1.0, "{round:?}");
+        assert_eq!(inside("flat", 3000.0), None);
+        // A cone to the rim holds a third: no well of this depth holds so little with one.
+        let whole = inside("v", 500.0).expect("it is known");
+        assert!((whole.volume() - 1047.2).abs() < 1.0, "{whole:?}");
     }
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::definition::{Definition, Opening, Well};
+use super::definition::{Definition, Opening, Shape, Well};
 
 /// A resource; lengths in mm, volumes in µL.
 #[derive(Debug, Deserialize)]
@@ -152,6 +152,7 @@ impl Resource {
             volume: volume.ok_or_else(|| format!("the `max_volume` of `{}` is not a number", of.name))?,
             opening: Some(if round { Opening::Round(size[0].min(size[1])) } else { Opening::Square(size) }),
             inside: None,
+            shape: Shape::Straight,
             reach: None,
         })
     }
@@ -165,6 +166,7 @@ impl Resource {
             volume: tip.maximal_volume,
             opening: None,
             inside: None,
+            shape: Shape::Straight,
             reach: Some(tip.total_tip_length - tip.fitting_depth.unwrap_or(0.0)).filter(|reach| *reach > 0.0),
         })
     }
