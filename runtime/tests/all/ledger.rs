@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::engine_model::{Build, assign, engine, run};
 
 fn pour(b: &mut Build, fraction: f64, from: u32, to: u32) -> Action {
-    Action::Move { fraction: b.num(fraction), from, to, span: Span::default() }
+    Action::Move { fraction: b.num(fraction), but: Box::default(), from, to, span: Span::default() }
 }
 
 /// Two mixtures of enthalpy and two species, and a balance of each.
