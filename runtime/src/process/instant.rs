@@ -115,9 +115,12 @@ impl Engine<'_> {
             }
             &Action::Move { fraction: node, ref but, from, to, span } => {
                 let fraction = self.eval(node);
-                let without = |n: &NodeId| !self.eval(*n).is_finite();
-                if let Some(node) = std::iter::once(node).chain(but.iter().map(|k| k.stays.source())).find(without) {
-                    return Err(self.no_share(node, who, span));
+                if !fraction.is_finite() {
+                    return Err(self.no_share(node, false, who, span));
+                }
+                let stays = but.iter().map(|kept| kept.stays.source());
+                if let Some(node) = stays.into_iter().find(|node| !self.eval(*node).is_finite()) {
+                    return Err(self.no_share(node, true, who, span));
                 }
                 let mass = self.carry(fraction, but, from, to, span)?;
                 observer.moved(self.time, from, to, mass);
@@ -156,7 +159,8 @@ impl Engine<'_> {
     /// The share of the mass of a mixture that is not held back; 0 of nothing.
     fn free(&self, mixture: &Mixture, held: &Held) -> f64 {
         let weighed = |amount: &dyn Fn(u32) -> f64| {
-            let of = |c: &Content| amount(c.state) * self.model.species[c.species as usize].molar_mass;
+            let molar_mass = |c: &Content| self.model.species.get(c.species as usize).map_or(0.0, |s| s.molar_mass);
+            let of = |c: &Content| amount(c.state) * molar_mass(c);
             mixture.contents.iter().map(of).sum::<f64>()
         };
         let all = weighed(&|state| self.state(state));
