@@ -14,7 +14,7 @@ use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span, codes};
 use serde::Serialize;
 
 use crate::exec::{Alarm, Listener, OperationState, StepState};
-use crate::ledger::transfer;
+use crate::ledger::{Held, transfer};
 use crate::process::{Engine, Observer};
 use crate::touched::{Below, Touched};
 use condition::Condition;
@@ -271,17 +271,18 @@ impl<'p> Screen<'p> {
         let mut states = engine.states();
         let mut changed = BTreeSet::new();
         for action in operation.at_start.iter().chain(&operation.at_end) {
-            match *action {
-                Action::Assign { state, value, .. } => {
+            match action {
+                &Action::Assign { state, value, .. } => {
                     let value = engine.eval_with(value, &states);
                     *states.get_mut(state as usize)? = value;
                     changed.insert(state);
                 }
-                Action::Move { fraction, from, to, .. } => {
+                &Action::Move { fraction, ref but, from, to, .. } => {
+                    let held = Held::new(but, |s| states[s as usize], |node| engine.eval_with(node, &states)).ok()?;
                     let fraction = engine.eval_with(fraction, &states);
                     let mixtures = &engine.model().mixtures;
                     let (from, to) = (mixtures.get(from as usize)?, mixtures.get(to as usize)?);
-                    let after = transfer(|s| states[s as usize], fraction, from, to).ok()?;
+                    let after = transfer(|s| states[s as usize], fraction, &held, from, to).ok()?;
                     after.into_iter().for_each(|(state, value)| states[state as usize] = value);
                     changed.extend(from.extensive.iter().chain(&to.extensive).map(|(_, state)| *state));
                 }

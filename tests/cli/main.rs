@@ -2,6 +2,7 @@
 
 mod along;
 mod aqueous;
+mod beads;
 mod beforehand;
 mod beginnings;
 mod bill;

@@ -456,7 +456,8 @@ impl Draw<'_> {
         let volume = (self.random.within(1, 25) * scale) as u32;
         match self.random.below(10) {
             0..=5 => Action::Drip(volume, from, to),
-            6..=8 => Action::Tip(volume, from, to),
+            6 | 7 => Action::Tip(volume, from, to),
+            8 => Action::Strain(volume, from, to),
             _ => Action::Double(volume, from, to),
         }
     }
@@ -530,7 +531,7 @@ fn raises(block: &Block) -> BTreeSet<&'static str> {
 fn refusals(action: &Action) -> &'static [&'static str] {
     match action {
         Action::Drip(..) | Action::Double(..) => &["volume_underflow", "volume_overflow"],
-        Action::Tip(..) => &["volume_overflow"],
+        Action::Tip(..) | Action::Strain(..) => &["volume_overflow"],
         Action::Fire(_) => &["lid_open"],
         Action::Open(_) => &["still_moving"],
         Action::TakeTip => &["tip_on_tip"],

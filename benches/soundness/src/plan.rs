@@ -263,6 +263,8 @@ pub enum Action {
     Drip(u32, usize, usize),
     /// Moves uL without asking.
     Tip(u32, usize, usize),
+    /// Moves uL without asking, of what does not stay: of the first liquid a share does.
+    Strain(u32, usize, usize),
     /// A skill of two drips with a pause between.
     Double(u32, usize, usize),
     /// Puts a cap on.
@@ -413,6 +415,7 @@ impl Action {
         match self {
             Action::Drip(..) => "transfer with needs",
             Action::Tip(..) => "transfer without needs",
+            Action::Strain(..) => "transfer that holds back",
             Action::Double(..) => "skill with steps",
             Action::Cap(_) | Action::Uncap(_) => "cap",
             Action::Fire(_) | Action::Quench(_) => "device on, off",
@@ -428,7 +431,7 @@ impl Action {
     /// What its effects change.
     pub fn uses(&self) -> Vec<Thing> {
         match *self {
-            Action::Drip(_, a, b) | Action::Tip(_, a, b) => vec![Thing::Cup(a), Thing::Cup(b)],
+            Action::Drip(_, a, b) | Action::Tip(_, a, b) | Action::Strain(_, a, b) => vec![Thing::Cup(a), Thing::Cup(b)],
             Action::Double(..) => Vec::new(),
             Action::Cap(c) | Action::Uncap(c) => vec![Thing::Cup(c)],
             Action::Fire(o) | Action::Quench(o) | Action::Open(o) | Action::Close(o) => vec![Thing::Oven(o)],

@@ -84,6 +84,10 @@ extern skill splash(v: Volume) from(source: Vessel) into(target: Vessel)
     effect move(v, from: source, to: target)
     takes 0.71 s
 
+extern skill strain(v: Volume) from(source: Vessel) into(target: Vessel)
+    effect move(v, from: source, to: target, but: each(s in [red]: 0.75))
+    takes 0.67 s
+
 skill double(v: Volume) from(source: Vessel) into(target: Vessel)
     fails volume_underflow, volume_overflow, capped
 {
@@ -427,6 +431,7 @@ impl At<'_> {
         match *action {
             Action::Drip(v, a, b) => format!("drip {v} uL from {} into {}", self.cup(a), self.cup(b)),
             Action::Tip(v, a, b) => format!("splash {v} uL from {} into {}", self.cup(a), self.cup(b)),
+            Action::Strain(v, a, b) => format!("strain {v} uL from {} into {}", self.cup(a), self.cup(b)),
             Action::Double(v, a, b) => format!("double {v} uL from {} into {}", self.cup(a), self.cup(b)),
             Action::Cap(c) => format!("cap {}", self.cup(c)),
             Action::Uncap(c) => format!("uncap {}", self.cup(c)),

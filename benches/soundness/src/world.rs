@@ -38,6 +38,9 @@ const SYRINGE: f64 = 5_000.0;
 /// uL that its pump moves at least.
 const LEAST: f64 = 10.0;
 
+/// The share of the first liquid that a transfer which holds back leaves behind.
+const STAYS: f64 = 0.75;
+
 /// g/mol of the species of the reaction.
 const MOLAR_MASS: f64 = 46.069;
 
@@ -77,6 +80,17 @@ impl Mixture {
             *m -= *o;
         }
         out.heat = self.heat * share;
+        self.heat -= out.heat;
+        out
+    }
+
+    /// Sets a share of the first liquid aside, as warm as the whole.
+    fn hold_back(&mut self, share: f64) -> Mixture {
+        let mut out = Mixture { seen: self.seen, ..Mixture::default() };
+        let warm = self.temperature();
+        out.mass[0] = self.mass[0] * share;
+        out.heat = out.capacity() * warm;
+        self.mass[0] -= out.mass[0];
         self.heat -= out.heat;
         out
     }
@@ -254,6 +268,7 @@ impl World {
         match *action {
             Action::Drip(..) => 1.13,
             Action::Tip(..) => 0.71,
+            Action::Strain(..) => 0.67,
             Action::Double(..) => 0.0,
             Action::Cap(_) | Action::Uncap(_) => 2.3,
             Action::Fire(_) => 1.7,
@@ -389,6 +404,7 @@ impl World {
             action,
             Action::Drip(..)
                 | Action::Tip(..)
+                | Action::Strain(..)
                 | Action::Pick(_)
                 | Action::Place(..)
                 | Action::PutBack(_)
@@ -400,7 +416,8 @@ impl World {
     /// What an action does.
     pub fn effect(&mut self, action: &Action) -> Result<(), Refusal> {
         match *action {
-            Action::Drip(v, a, b) | Action::Tip(v, a, b) => return self.pour(f64::from(v), a, b),
+            Action::Drip(v, a, b) | Action::Tip(v, a, b) => return self.pour(f64::from(v), a, b, 0.0),
+            Action::Strain(v, a, b) => return self.pour(f64::from(v), a, b, STAYS),
             Action::Cap(c) => self.cups[c].cap = Some(true),
             Action::Uncap(c) => self.cups[c].cap = Some(false),
             Action::Fire(o) => self.ovens[o].burning = true,
@@ -467,13 +484,17 @@ impl World {
         Ok(())
     }
 
-    /// Moves a volume without asking; the target may flow over.
-    fn pour(&mut self, volume: f64, from: usize, to: usize) -> Result<(), Refusal> {
-        let there = self.cups[from].contents.volume();
+    /// Moves a volume without asking, while a share of the first liquid stays; the target may flow over.
+    fn pour(&mut self, volume: f64, from: usize, to: usize, stays: f64) -> Result<(), Refusal> {
+        let source = &mut self.cups[from].contents;
+        let stays = source.hold_back(stays);
+        let there = source.volume();
         if there < volume - NOTHING {
+            source.add(stays);
             return Err(Refusal::Fault);
         }
-        let moved = self.cups[from].contents.take((volume / there).min(1.0));
+        let moved = source.take((volume / there).min(1.0));
+        source.add(stays);
         self.cups[to].contents.add(moved);
         match self.cups[to].is_over() || self.cups[from].is_over() {
             true => Err(Refusal::Failure("volume_overflow")),

@@ -150,6 +150,8 @@ codes! {
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a volume below the smallest volume of a pipette";
     ABOVE_LIQUID "above-liquid" "V3" "a tip aspirates above the surface of the liquid";
+    BEADS_NOT_HELD "beads-not-held" "V3" "a pipette takes beads along, as the magnets under the well are down";
+    BEADS_NOT_GATHERED "beads-not-gathered" "V3" "a pipette takes liquid before the beads have gathered at the magnets";
     OUTSIDE_WELL "outside-well" "V3" "a height outside of the well";
     TIP_OVERFLOW "tip-overflow" "V3" "a tip would aspirate more than it holds";
     NEVER_FILLED "never-filled" "V2" "liquid is taken from an empty vessel";

@@ -122,10 +122,13 @@ pub enum Action {
         /// Its statement.
         span: Span,
     },
-    /// Moves the fraction `fraction` of every extensive quantity from one mixture to another.
+    /// Moves the fraction `fraction` of every extensive quantity, but of what stays behind, from one mixture to another.
     Move {
         /// 0 to 1; outside is a fault.
         fraction: NodeId,
+        /// What is held back; of all other quantities of the source nothing is.
+        #[serde(default, skip_serializing_if = "<[Kept]>::is_empty")]
+        but: Box<[Kept]>,
         /// Index into [`Model::mixtures`].
         from: u32,
         /// Index into [`Model::mixtures`].
@@ -135,12 +138,75 @@ pub enum Action {
     },
 }
 
-impl Action {
+/// What a transfer leaves behind of one extensive quantity of its source, whatever fraction of the rest it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// The quantity, an index into [`Model::states`].
+    pub state: u32,
+    /// How much of it stays.
+    pub stays: Stays,
+}
+
+/// How much of a quantity stays behind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Stays {
+    /// This share of it, 0 to 1.
+    Share(NodeId),
+    /// So much of it.
+    Amount(NodeId),
+}
+
+impl Stays {
     /// The node that it takes its value from.
+    pub fn source(self) -> NodeId {
+        match self {
+            Stays::Share(node) | Stays::Amount(node) => node,
+        }
+    }
+
+    /// How much stays of a quantity that is `now`, where the node is worth `value`.
+    pub fn of(self, now: f64, value: f64) -> f64 {
+        match self {
+            Stays::Share(_) => value * now,
+            Stays::Amount(_) => value,
+        }
+    }
+}
+
+impl Kept {
+    /// What stays of the quantity where [`Stays::source`] is worth `value`, if that can be: a share is 0 to 1, to rounding.
+    pub fn amount(&self, now: f64, value: f64) -> Option<f64> {
+        let possible = match self.stays {
+            Stays::Share(_) => (-SHARE_ROUNDING..=1.0 + SHARE_ROUNDING).contains(&value),
+            Stays::Amount(_) => value.is_finite(),
+        };
+        let value = if matches!(self.stays, Stays::Share(_)) { value.clamp(0.0, 1.0) } else { value };
+        possible.then(|| self.stays.of(now, value))
+    }
+}
+
+/// A share that stays behind is outside 0 to 1 only if it is so by more than this.
+pub const SHARE_ROUNDING: f64 = 1e-9;
+
+impl Action {
+    /// The node that it takes its value from; what it leaves behind has [others](Action::but).
     pub fn source(&self) -> NodeId {
         match self {
             Action::Assign { value, .. } => *value,
             Action::Move { fraction, .. } => *fraction,
+        }
+    }
+
+    /// All nodes that it takes values from.
+    pub fn sources(&self) -> impl Iterator<Item = NodeId> + '_ {
+        std::iter::once(self.source()).chain(self.but().iter().map(|kept| kept.stays.source()))
+    }
+
+    /// What a transfer leaves behind.
+    pub fn but(&self) -> &[Kept] {
+        match self {
+            Action::Assign { .. } => &[],
+            Action::Move { but, .. } => but,
         }
     }
 

@@ -8,6 +8,7 @@ use crate::declare::Type;
 use crate::declare::failures::BARS;
 use crate::declare::fields::word;
 use crate::declare::tables::{MATTER, OUTSIDE, is_true};
+use crate::elaborate::held_back::OF_EACH;
 use crate::elaborate::lab::SYMMETRIC;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::free::Bound;
@@ -20,7 +21,7 @@ use crate::near;
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
         Role::State => ("a state", &["unit", "scale", COUNTS_AS, BARS]),
-        Role::Extensive => ("an extensive quantity", &["unit", "scale", HIDDEN, ONLY_WITH, MATTER, OUTSIDE]),
+        Role::Extensive => ("an extensive quantity", &["unit", "scale", HIDDEN, ONLY_WITH, MATTER, OUTSIDE, OF_EACH]),
         Role::Derived => ("a derived quantity", &["unit", HIDDEN, INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
         Role::Param => ("a parameter", &["above", "at_least", "at_most", GIVEN_BY, GIVES, GIVES_AT]),
@@ -48,6 +49,7 @@ fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
         OUTSIDE if !is_true(&o.value) => "`outside` must be `true`, or left out",
         GIVES_AT if !matches!(&*o.value.kind, ExprKind::Range(..)) => "`gives_at` must be a range",
         GIVES if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`gives` must be the name of a species in quotes",
+        OF_EACH if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`of_each` must be the name of a function in quotes",
         INSTEAD if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`instead` must be a text",
         _ => return None,
     };

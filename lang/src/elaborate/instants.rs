@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::model::{Action, Domain, State};
+use matterix_ir::model::{Action, Domain, Kept, State, Stays};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, codes};
 
@@ -171,15 +171,27 @@ impl<'a> Elaborator<'a> {
     fn guarded_action(&mut self, action: Action, guard: Option<NodeId>) -> Action {
         let Some(g) = guard else { return action };
         match action {
-            Action::Move { fraction, from, to, span } => {
+            Action::Move { fraction, but, from, to, span } => {
                 let zero = self.graph.number(0.0);
-                Action::Move { fraction: self.graph.select(g, fraction, zero), from, to, span }
+                // What is not done has no shares that could be out of range.
+                let but = but.iter().map(|kept| self.guarded_kept(*kept, g)).collect();
+                Action::Move { fraction: self.graph.select(g, fraction, zero), but, from, to, span }
             }
             Action::Assign { state, value, span } => {
                 let old = self.graph.add(Op::State(state));
                 Action::Assign { state, value: self.graph.select(g, value, old), span }
             }
         }
+    }
+
+    fn guarded_kept(&mut self, kept: Kept, guard: NodeId) -> Kept {
+        let zero = self.graph.number(0.0);
+        let mut guarded = |node| self.graph.select(guard, node, zero);
+        let stays = match kept.stays {
+            Stays::Share(node) => Stays::Share(guarded(node)),
+            Stays::Amount(node) => Stays::Amount(guarded(node)),
+        };
+        Kept { stays, ..kept }
     }
 
     /// The states that an action changes.

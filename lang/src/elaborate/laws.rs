@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Kept};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
+use super::held_back::{BUT, HeldBack};
 use super::pairs;
 use super::tuples::Tuples;
 use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
@@ -21,6 +22,18 @@ struct Job<'a> {
     process: &'a ast::Process,
     scope: Scope,
     name: String,
+}
+
+/// What a `move` takes from where to where.
+pub struct Moving {
+    /// The share of what does not stay behind; per second, where it has a rate.
+    pub fraction: NodeId,
+    /// What stays behind.
+    pub but: Box<[Kept]>,
+    /// The mixtures.
+    pub from: InstanceId,
+    /// Where it goes.
+    pub to: InstanceId,
 }
 
 /// What is made of the lines of a law.
@@ -373,7 +386,7 @@ impl<'a> Elaborator<'a> {
         scope: &mut Scope,
         out: &mut Vec<(Target, NodeId, Span)>,
     ) {
-        let Some((rate, from, to)) = self.move_call(call, true, scope) else { return };
+        let Some(Moving { fraction: rate, from, to, .. }) = self.move_call(call, true, scope) else { return };
         self.moves.insert((from, to));
         let zero = self.graph.number(0.0);
         let flows = self.graph.binary(BinaryOp::Lt, zero, rate);
@@ -441,7 +454,7 @@ impl<'a> Elaborator<'a> {
             return self.soil_call(call, args, span, scope);
         }
         match self.move_call(call, false, scope) {
-            Some((fraction, from, to)) => self.transfer_actions(fraction, from, to, span),
+            Some(moving) => self.transfer_actions(moving, span),
             None => Vec::new(),
         }
     }
@@ -529,19 +542,15 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A transfer with what it does to the lineage of its destination.
-    fn transfer_actions(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Vec<Action> {
-        let mut out = vec![self.move_action(fraction, from, to, span)];
+    fn transfer_actions(&mut self, moving: Moving, span: Span) -> Vec<Action> {
+        let (from, to) = (moving.from, moving.to);
+        let mut out = vec![self.move_action(moving, span)];
         out.extend(self.inherit(from, to, span));
         out
     }
 
-    /// `move(q, from: a, to: b)`: the fraction (per second if `rate`) and the mixtures.
-    pub fn move_call(
-        &mut self,
-        call: &'a Expr,
-        rate: bool,
-        scope: &mut Scope,
-    ) -> Option<(NodeId, InstanceId, InstanceId)> {
+    /// `move(q, from: a, to: b, but: each(s in set: share))`: the fraction (per second if `rate`) and the mixtures.
+    pub fn move_call(&mut self, call: &'a Expr, rate: bool, scope: &mut Scope) -> Option<Moving> {
         let ExprKind::Call(callee, args) = &*call.kind else { return None };
         if !matches!(&*callee.kind, ExprKind::Name(n) if n.text == "move") {
             self.report(
@@ -557,7 +566,12 @@ impl<'a> Elaborator<'a> {
         }
         let mut quantity = None;
         let mut ends: BTreeMap<&str, InstanceId> = BTreeMap::new();
+        let mut but = None;
         for arg in args {
+            if arg.name.as_ref().is_some_and(|n| n.text == BUT) {
+                but = Some(&arg.value);
+                continue;
+            }
             let v = self.expr(&arg.value, scope);
             match (arg.name.as_ref().map(|n| n.text.as_str()), v) {
                 (_, Value::Error) => return None,
@@ -585,13 +599,25 @@ impl<'a> Elaborator<'a> {
             );
             return None;
         };
+        let held = match but {
+            Some(but) if rate => {
+                let headline = "holding something back from a transfer with a rate is not supported yet";
+                let d = Diagnostic::error(codes::UNSUPPORTED, but.span, headline, "not supported yet");
+                self.report(d.help("move it in an event or an effect, or write what flows as rates of amounts and heat"));
+                return None;
+            }
+            Some(but) => self.held_back(but, from, scope)?,
+            None => HeldBack::default(),
+        };
+        let moving = |fraction, held: HeldBack| Some(Moving { fraction, but: held.kept, from, to });
         let amount = if rate { q.dimension.times(&self.duration()) } else { q.dimension.clone() };
         if amount.is_one() {
-            return Some((q.node, from, to));
+            return moving(q.node, held);
         }
         if let Some(m) = self.size_in(from, &amount) {
             let Value::Num(size) = self.member_value(from, m, at) else { return None };
-            let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
+            let size = self.free_size(size.node, &held);
+            let mut share = self.graph.binary(BinaryOp::Div, q.node, size);
             self.note_place(share, call.span);
             // What follows what is left takes nothing of nothing; what moves at once may be nothing in an empty vessel, too, which has no amounts.
             let left = |(key, _): &(&crate::eval::lab::ExtensiveKey, &u32)| key.instance == from;
@@ -603,7 +629,7 @@ impl<'a> Elaborator<'a> {
                 let nothing = self.graph.binary(BinaryOp::Le, q.node, zero);
                 share = self.graph.select(nothing, q.node, share);
             }
-            return Some((share, from, to));
+            return moving(share, held);
         }
         let found = self.describe(&q);
         self.report(Diagnostic::error(
@@ -630,10 +656,11 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A transfer; mixtures are numbered in the order of the instances.
-    fn move_action(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Action {
+    fn move_action(&mut self, moving: Moving, span: Span) -> Action {
+        let Moving { fraction, but, from, to } = moving;
         self.moves.insert((from, to));
         let (from, to) = (self.mixture_index(from), self.mixture_index(to));
-        Action::Move { fraction, from, to, span }
+        Action::Move { fraction, but, from, to, span }
     }
 
     /// `place = value` as an action; with a condition the place keeps its value where it does not hold.

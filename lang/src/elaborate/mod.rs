@@ -8,6 +8,7 @@ pub mod contents;
 mod declared;
 pub mod events;
 pub mod hazards;
+pub mod held_back;
 pub mod include;
 mod instants;
 mod joints;

@@ -283,9 +283,9 @@ impl<'a> Planner<'a, '_> {
     /// The states that the needs and effects of an operation look at.
     fn reads(&self, operation: &Operation) -> Vec<u32> {
         let mut out = Vec::new();
-        let values = operation.at_end.iter().filter_map(|action| match action {
-            Action::Assign { value, .. } => Some(*value),
-            Action::Move { .. } => None,
+        let values = operation.at_end.iter().flat_map(|action| {
+            let kept = action.but().iter().map(|kept| kept.stays.source());
+            action.assigned().map(|_| action.source()).into_iter().chain(kept)
         });
         for node in operation.needs.iter().map(|need| need.node).chain(values) {
             self.lab.graph.visit(node, |op| {

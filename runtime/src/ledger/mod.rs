@@ -7,4 +7,4 @@ mod balance;
 mod transfer;
 
 pub use balance::{BalanceReport, Balances, CLOSURE};
-pub use transfer::{Refusal, transfer};
+pub use transfer::{Held, Refusal, transfer};

@@ -61,8 +61,9 @@ impl<'m> Engine<'m> {
     }
 
     /// The fault of a transfer of a share that is no finite number.
-    pub(super) fn no_share(&self, fraction: NodeId, who: Option<&str>, span: Span) -> Fault {
-        let headline = "the transferred fraction has no finite value".to_owned();
+    pub(super) fn no_share(&self, fraction: NodeId, stays: bool, who: Option<&str>, span: Span) -> Fault {
+        let what = if stays { "share that is to stay behind" } else { "transferred fraction" };
+        let headline = format!("the {what} has no finite value");
         let fault = self.without_value(headline, fraction, who, span);
         Fault { code: codes::TRANSFER_FRACTION, ..fault }.help("is the source empty?")
     }

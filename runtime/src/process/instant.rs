@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Content, Kept, Mixture};
 use matterix_ir::{NodeId, Span, codes};
 
 use super::index::Root;
 use super::{Engine, Observer};
 use crate::fault::Fault;
-use crate::ledger::{Refusal, transfer};
+use crate::ledger::{Held, Refusal, transfer};
 
 /// So many crossings within [`CHATTER_TIME`] are a fault.
 const CHATTER: usize = 1000;
@@ -103,8 +103,8 @@ impl Engine<'_> {
         who: Option<&str>,
         observer: &mut dyn Observer,
     ) -> Result<(), Fault> {
-        match *action {
-            Action::Assign { state, value: node, span } => {
+        match action {
+            &Action::Assign { state, value: node, span } => {
                 let value = self.eval(node);
                 if !value.is_finite() {
                     return Err(self.no_effect(state, node, who, span));
@@ -113,13 +113,17 @@ impl Engine<'_> {
                 self.write(state, value);
                 Ok(())
             }
-            Action::Move { fraction: node, from, to, span } => {
+            &Action::Move { fraction: node, ref but, from, to, span } => {
                 let fraction = self.eval(node);
                 if !fraction.is_finite() {
-                    return Err(self.no_share(node, who, span));
+                    return Err(self.no_share(node, false, who, span));
                 }
-                self.carry(fraction, from, to, span)?;
-                observer.moved(self.time, from, to, fraction);
+                let stays = but.iter().map(|kept| kept.stays.source());
+                if let Some(node) = stays.into_iter().find(|node| !self.eval(*node).is_finite()) {
+                    return Err(self.no_share(node, true, who, span));
+                }
+                let mass = self.carry(fraction, but, from, to, span)?;
+                observer.moved(self.time, from, to, mass);
                 Ok(())
             }
         }
@@ -139,13 +143,28 @@ impl Engine<'_> {
         self.show(observer);
     }
 
-    fn carry(&mut self, fraction: f64, from: u32, to: u32, span: Span) -> Result<(), Fault> {
+    /// Makes a transfer; gives the share of the mass of the source that moves.
+    fn carry(&mut self, fraction: f64, but: &[Kept], from: u32, to: u32, span: Span) -> Result<f64, Fault> {
         let model = self.model;
         let (from, to) = (&model.mixtures[from as usize], &model.mixtures[to as usize]);
-        let after = transfer(|state| self.state(state), fraction, from, to);
+        let held = Held::new(but, |state| self.state(state), |node| self.eval(node));
+        let held = held.map_err(|refusal| self.refused(refusal).at(span))?;
+        let after = transfer(|state| self.state(state), fraction, &held, from, to);
         let after = after.map_err(|refusal| self.refused(refusal).at(span))?;
+        let mass = if held.is_empty() { fraction } else { fraction * self.free(from, &held) };
         after.into_iter().for_each(|(state, value)| self.write(state, value));
-        Ok(())
+        Ok(mass)
+    }
+
+    /// The share of the mass of a mixture that is not held back; 0 of nothing.
+    fn free(&self, mixture: &Mixture, held: &Held) -> f64 {
+        let weighed = |amount: &dyn Fn(u32) -> f64| {
+            let molar_mass = |c: &Content| self.model.species.get(c.species as usize).map_or(0.0, |s| s.molar_mass);
+            let of = |c: &Content| amount(c.state) * molar_mass(c);
+            mixture.contents.iter().map(of).sum::<f64>()
+        };
+        let all = weighed(&|state| self.state(state));
+        if all > 0.0 { weighed(&|state| self.state(state) - held.of(state)) / all } else { 0.0 }
     }
 
     fn refused(&self, refusal: Refusal) -> Fault {
@@ -161,6 +180,12 @@ impl Engine<'_> {
                 let help =
                     if fraction > 1.0 { "transfer less, or fill the source first" } else { "is the source empty?" };
                 Fault::new(codes::TRANSFER_FRACTION, self.time, message).help(help)
+            }
+            Refusal::Kept(state, share) => {
+                let name = &self.model.states[state as usize].name;
+                let shown = matterix_ir::quantity::show_number(share);
+                let message = format!("the share of `{name}` that is to stay behind is {shown}: it must be 0 to 1");
+                Fault::new(codes::TRANSFER_FRACTION, self.time, message)
             }
             Refusal::NoPlace(key, state) => {
                 let name = &self.model.states[state as usize].name;

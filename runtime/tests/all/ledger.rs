@@ -1,6 +1,6 @@
 //! Transfers and balances.
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Kept, Stays};
 use matterix_ir::{Span, codes};
 use matterix_runtime::process::{Engine, Options};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::engine_model::{Build, assign, engine, run};
 
 fn pour(b: &mut Build, fraction: f64, from: u32, to: u32) -> Action {
-    Action::Move { fraction: b.num(fraction), from, to, span: Span::default() }
+    Action::Move { fraction: b.num(fraction), but: Box::default(), from, to, span: Span::default() }
 }
 
 /// Two mixtures of enthalpy and two species, and a balance of each.
@@ -41,6 +41,60 @@ proptest! {
             prop_assert!((before - now).abs() <= 2.0 * f64::EPSILON * before);
             prop_assert!(after[i] >= 0.0);
         }
+    }
+}
+
+/// The same transfer, of whose source a share of the first quantity and so much of the third stay.
+fn strain(b: &mut Build, fraction: f64, share: f64, amount: f64) -> Action {
+    let stays = [(0, Stays::Share(b.num(share))), (2, Stays::Amount(b.num(amount)))];
+    let but = stays.into_iter().map(|(state, stays)| Kept { state, stays }).collect();
+    Action::Move { fraction: b.num(fraction), but, from: 0, to: 1, span: Span::default() }
+}
+
+proptest! {
+    #[test]
+    fn what_is_held_back_stays_and_nothing_is_lost(
+        amounts in prop::array::uniform6(0.0..1e6f64),
+        fraction in 0.0..=1.0f64,
+        share in 0.0..=1.0f64,
+        part in 0.0..=1.0f64,
+    ) {
+        let mut b = two_mixtures(amounts);
+        let action = strain(&mut b, fraction, share, part * amounts[2]);
+        let mut engine = engine(&b.model);
+        engine.apply(&[action], &mut ()).expect("a fraction of what there is");
+        let after = engine.states();
+        let held = [share * amounts[0], 0.0, part * amounts[2]];
+        for i in 0..3 {
+            let (before, now) = (amounts[i] + amounts[i + 3], after[i] + after[i + 3]);
+            prop_assert!((before - now).abs() <= 4.0 * f64::EPSILON * before);
+            let left = held[i] + (1.0 - fraction) * (amounts[i] - held[i]);
+            prop_assert!((after[i] - left).abs() <= 1e-9 * (1.0 + amounts[i]), "{} is not {left}", after[i]);
+            prop_assert!(after[i] >= held[i] * (1.0 - 1e-12));
+        }
+    }
+}
+
+#[test]
+fn all_but_what_is_held_back_leaves_just_that() {
+    let mut b = two_mixtures([0.5, 5.5, 2e4, 0.0, 1.0, 3e3]);
+    let action = strain(&mut b, 1.0, 1.0, 5e3);
+    let mut engine = engine(&b.model);
+    engine.apply(&[action], &mut ()).expect("everything else");
+    assert_eq!(engine.states(), [0.5, 0.0, 5e3, 0.0, 6.5, 1.8e4]);
+}
+
+#[test]
+fn a_share_that_is_none_is_a_fault() {
+    for share in [-1e-6, 1.0 + 1e-6, f64::NAN] {
+        let mut b = two_mixtures([0.5, 5.5, 2e4, 0.0, 1.0, 3e3]);
+        let action = strain(&mut b, 0.5, share, 0.0);
+        let mut engine = engine(&b.model);
+        let before = engine.states();
+        let fault = engine.apply(&[action], &mut ()).expect_err("no share");
+        assert_eq!(fault.code, codes::TRANSFER_FRACTION, "{fault}");
+        assert!(fault.message.contains("stay"), "{fault}");
+        assert_eq!(engine.states(), before);
     }
 }
 

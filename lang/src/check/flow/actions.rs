@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Kept, SHARE_ROUNDING, Stays};
 use matterix_ir::plan::{Condition, Operation, Presumption, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
@@ -12,6 +12,7 @@ use super::Interpreter;
 use super::bonds::{Bonds, Form};
 use super::cases;
 use super::course::Course;
+use super::held_back::Staying;
 use super::state::AbstractState;
 use super::value::{AbstractValue, Imprecision};
 use crate::elaborate::mixtures::written;
@@ -289,14 +290,15 @@ impl Interpreter<'_, '_> {
                 self.bind(bonds, facts);
                 changed
             }
-            Action::Move { fraction, from, to, .. } => {
+            Action::Move { fraction, but, from, to, .. } => {
+                let kept = self.staying(but, facts);
                 let share = self.eval(*fraction, facts);
                 if share.bounds().1 > 1.0 + TOO_MUCH && share.bounds().0 <= 1.0 && !self.is_beside(*from) {
                     self.leaves_open(*fraction, (self.site(), self.site()));
                 }
                 let ends = if share.exact().is_none() { self.shares(*fraction, *from, facts) } else { None };
                 let told = self.share_by_case(*fraction, &share, facts);
-                self.transfer(&share, (ends, told), *from, *to, facts)
+                self.transfer(&share, (ends, told, &kept), *from, *to, facts)
             }
         }
     }
@@ -327,7 +329,7 @@ impl Interpreter<'_, '_> {
     fn transfer(
         &mut self,
         fraction: &AbstractValue,
-        (ends, told): (Option<[f64; 2]>, Option<Vec<f64>>),
+        (ends, told, kept): (Option<[f64; 2]>, Option<Vec<f64>>, &[Staying]),
         from: u32,
         to: u32,
         facts: &mut AbstractState,
@@ -355,14 +357,23 @@ impl Interpreter<'_, '_> {
         let mut changes = Vec::new();
         let mut by_case = Vec::new();
         for (source, target) in self.passages.between(from, to, &self.mixtures).iter() {
+            let stays = kept.iter().find(|kept| kept.state == *source);
+            let of_all = stays.map_or(Some(1.0), Staying::leaving);
             let Some(target) = *target else {
+                if of_all == Some(0.0) {
+                    continue;
+                }
                 self.no_place(*source, from, to, &fraction, facts);
                 continue;
             };
             if target == *source {
                 continue;
             }
-            let apart = told.as_ref().and_then(|shares| cases::moved(shares, *source, target, facts));
+            // What stays, on each way the same share, leaves so much less of the share that is taken.
+            let apart = told.as_ref().zip(of_all).and_then(|(shares, leaving)| {
+                let shares: Vec<f64> = shares.iter().map(|share| share * leaving).collect();
+                cases::moved(&shares, *source, target, facts)
+            });
             if let Some([rest, more]) = apart {
                 let ends = [*source, target].map(|state| facts.states[state as usize].why());
                 let why = ends.into_iter().chain([fraction.why()]).flatten().max().unwrap_or(Imprecision::Paths);
@@ -373,12 +384,15 @@ impl Interpreter<'_, '_> {
                 continue;
             }
             let held = &facts.states[*source as usize];
-            let (moved, rest) = match ends.filter(|_| self.amounts.contains(source)) {
-                Some([of_least, of_most]) => {
+            let by_ends = ends.filter(|_| self.amounts.contains(source)).zip(of_all);
+            let (moved, rest) = match by_ends {
+                Some(([of_least, of_most], leaving)) => {
+                    let (of_least, of_most) = (of_least * leaving, of_most * leaving);
                     let (least, most) = held.bounds();
                     let rest = held.with_ends((1.0 - of_least) * least, (1.0 - of_most) * most);
                     (held.with_ends(of_least * least, of_most * most), rest)
                 }
+                None if stays.is_some() => stays.map_or((AbstractValue::Point(0.0), held.clone()), |s| s.part(&fraction, held)),
                 None => {
                     // A share of what is there leaves the rest: exact where the share is.
                     let kept = match fraction.exact() {
@@ -394,7 +408,8 @@ impl Interpreter<'_, '_> {
             let more = AbstractValue::binary(BinaryOp::Add, &facts.states[target as usize], &moved);
             changes.extend([(*source, rest), (target, more)]);
         }
-        let bonds = facts.bonds.as_deref().cloned().map(|mut bonds| {
+        // What is held back breaks the proportion by which bonds follow a transfer: what hung together there is known by itself only.
+        let bonds = facts.bonds.as_deref().cloned().filter(|_| kept.is_empty()).map(|mut bonds| {
             let ways = self.passages.between(from, to, &self.mixtures);
             bonds.transferred(&fraction, &ways, facts);
             bonds
@@ -403,6 +418,23 @@ impl Interpreter<'_, '_> {
         by_case.into_iter().for_each(|(state, values)| facts.tell(state, values));
         self.bind(bonds, facts);
         changed
+    }
+
+    /// What a transfer leaves behind, as far as that is known; a share out of range is reported.
+    fn staying(&mut self, but: &[Kept], facts: &AbstractState) -> Vec<Staying> {
+        let mut out = Vec::with_capacity(but.len());
+        for kept in but {
+            let value = self.eval(kept.stays.source(), facts);
+            let share = matches!(kept.stays, Stays::Share(_));
+            let (low, high) = value.bounds();
+            if share && (low > 1.0 + SHARE_ROUNDING || high < -SHARE_ROUNDING) {
+                self.no_share_to_keep(kept.state, if high < 0.0 { high } else { low });
+            } else if share && (low < -SHARE_ROUNDING || high > 1.0 + SHARE_ROUNDING) {
+                self.leaves_open(kept.stays.source(), (self.site(), self.site()));
+            }
+            out.push(Staying { state: kept.state, share, value });
+        }
+        out
     }
 
     /// Whether what goes on beside changes what a mixture holds.

@@ -33,6 +33,7 @@ mod failing;
 mod fluxes;
 mod handled;
 mod held;
+mod held_back;
 mod history;
 mod in_time;
 mod interference;

@@ -158,14 +158,14 @@ impl<'p> Interpreter<'p, '_> {
                     raced.states.insert(*state);
                 }
             }
-            Action::Move { fraction, from, to, .. } => {
+            Action::Move { from, to, .. } => {
                 let held: BTreeSet<u32> = self.mixtures[*from as usize].iter().map(|(_, s)| *s).collect();
-                let reads = self.parts(*fraction).states.clone();
+                let reads: BTreeSet<u32> = action.sources().flat_map(|node| self.parts(node).states.clone()).collect();
                 let filled = others.filled.get(from).is_some_and(|around| around.is_disjoint(claims));
                 // A share of a volume is the same matter, however much others have taken; half of what is there is not.
                 let shared = !reads.iter().any(|s| held.contains(s)) && held.iter().any(|s| others.written.contains(s));
                 let beside = reads.iter().any(|s| !held.contains(s) && self.is_met(*s, others, claims, raced));
-                let kept = self.names(*fraction, &raced.locals);
+                let kept = action.sources().any(|node| self.names(node, &raced.locals));
                 let drawn = shared && others.filled.get(from).is_none_or(|around| around.is_disjoint(claims));
                 if filled || drawn || beside || kept || !held.is_disjoint(&raced.states) {
                     self.add_held(&[*from, *to], &mut raced.states);

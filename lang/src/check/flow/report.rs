@@ -490,6 +490,16 @@ impl Interpreter<'_, '_> {
         self.found_on(d, about, open, turn);
     }
 
+    /// The share of a species that is to stay behind in a transfer is none.
+    pub fn no_share_to_keep(&mut self, state: u32, share: f64) {
+        let name = self.lab.states[state as usize].name.clone();
+        let shown = matterix_ir::quantity::show_number(share);
+        let headline = format!("the share of `{name}` that is to stay behind is {shown}: it must be 0 to 1");
+        let d = self.at_site(codes::TRANSFER_FRACTION, headline, "moves this".to_owned(), self.doubt > 0);
+        let about = d.span();
+        self.found(d, about);
+    }
+
     /// Events set each other off for certain, more often at one moment than a run follows; this is one of them.
     pub(super) fn cascades(&mut self, event: u32) {
         let event = &self.events[event as usize];

@@ -86,10 +86,7 @@ impl Interpreter<'_, '_> {
 fn asked_by(operation: &Operation) -> (Vec<&Condition>, Vec<NodeId>) {
     let presumed = operation.presumes.iter().map(|p| &p.condition);
     let conditions = operation.needs.iter().map(AsRef::as_ref).chain(presumed).chain(&operation.until);
-    let values = operation.at_start.iter().chain(&operation.at_end).map(|action| match action {
-        Action::Assign { value, .. } => *value,
-        Action::Move { fraction, .. } => *fraction,
-    });
+    let values = operation.at_start.iter().chain(&operation.at_end).flat_map(Action::sources);
     (conditions.collect(), values.chain(operation.takes.iter().map(|takes| takes.nominal)).collect())
 }
 

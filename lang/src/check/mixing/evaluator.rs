@@ -98,8 +98,13 @@ impl<'l, 'a> NodeEvaluator<'l, 'a> {
     /// Sum of the masses in a mixture, kg.
     pub fn mass(&self, mixture: InstanceId, world: &MixtureState) -> f64 {
         let species = &self.lab.tables.species;
-        let list = self.amounts.get(&mixture).map_or(&[][..], Vec::as_slice);
+        let list = self.amounts(mixture);
         list.iter().map(|(s, state)| world.states[*state as usize] * species.get(*s).molar_mass).sum()
+    }
+
+    /// The species of a mixture with the states that are their amounts.
+    pub fn amounts(&self, mixture: InstanceId) -> &[(SpeciesId, u32)] {
+        self.amounts.get(&mixture).map_or(&[][..], Vec::as_slice)
     }
 }
 

@@ -535,7 +535,7 @@ impl Walk<'_, '_> {
             for (from, to) in &active {
                 let fresh = |w: &MixtureState| w.present(*to).filter(|(_, e)| !e.residue).count();
                 let (before, count) = (world.before(*from, *to), fresh(world));
-                world.transfer(self.eyes, f64::NAN, *from, *to, self.place(), true);
+                world.transfer(self.eyes, (f64::NAN, &[]), *from, *to, self.place(), true);
                 if fresh(world) != count {
                     changed = true;
                     self.arrived(&before, world, *to);

@@ -107,9 +107,9 @@ impl Setters {
 
 /// The states that an event goes by.
 fn asked(eyes: &NodeEvaluator<'_, '_>, event: &Event) -> Vec<u32> {
-    let values = event.actions.iter().filter_map(|action| match action {
-        Action::Assign { value, .. } => Some(*value),
-        Action::Move { .. } => None,
+    let values = event.actions.iter().flat_map(|action| {
+        let kept = action.but().iter().map(|kept| kept.stays.source());
+        action.assigned().map(|_| action.source()).into_iter().chain(kept)
     });
     let nodes: Vec<NodeId> = values.chain([event.when]).collect();
     let graph = &eyes.lab.graph;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::Span;
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Kept, Stays};
 use matterix_ir::pages::Pages;
 use matterix_ir::scene::InstanceId;
 
@@ -190,7 +190,7 @@ impl MixtureState {
                 self.set[*state as usize] = Some(step);
                 self.changed.insert(*state);
             }
-            Action::Move { fraction, from, to, .. } => {
+            Action::Move { fraction, but, from, to, .. } => {
                 let share = eyes.value(*fraction, self);
                 let mixtures = &eyes.lab.mixtures;
                 let (Some(&from), Some(&to)) = (mixtures.get(*from as usize), mixtures.get(*to as usize)) else {
@@ -199,7 +199,7 @@ impl MixtureState {
                 if share == 0.0 || from == to {
                     return;
                 }
-                self.transfer(eyes, share, from, to, step, true);
+                self.transfer(eyes, (share, but), from, to, step, true);
             }
         }
     }
@@ -208,7 +208,7 @@ impl MixtureState {
     pub fn transfer(
         &mut self,
         eyes: &NodeEvaluator<'_, '_>,
-        share: f64,
+        (share, but): (f64, &[Kept]),
         from: InstanceId,
         to: InstanceId,
         step: Span,
@@ -217,18 +217,30 @@ impl MixtureState {
         let moved = share * eyes.mass(from, self);
         let known = share > 0.0 && share <= 1.0 + 1e-9;
         let share = if known { share.min(1.0) } else { f64::NAN };
+        let kept: Vec<(Kept, f64)> = but.iter().map(|k| (*k, eyes.value(k.stays.source(), self))).collect();
         for (a, b) in eyes.passage(from, to).iter() {
             let there = self.states[*a as usize];
             if there == 0.0 {
                 continue;
             }
+            let stays = kept.iter().find(|(k, _)| k.state == *a).map_or(0.0, |(k, value)| k.stays.of(there, *value));
+            let moves = share * (there - stays);
             if let Some(b) = b {
-                self.states[*b as usize] += share * there;
+                self.states[*b as usize] += moves;
             }
-            self.states[*a as usize] = there - share * there;
+            self.states[*a as usize] = there - moves;
             self.changed.insert(*a);
             self.changed.extend(b);
         }
+        // Of these species some stays whatever is taken, and of those with a share of 1 all does.
+        let staying: BTreeMap<SpeciesId, f64> = eyes
+            .amounts(from)
+            .iter()
+            .filter_map(|(s, state)| {
+                let (kept, value) = kept.iter().find(|(k, _)| k.state == *state)?;
+                matches!(kept.stays, Stays::Share(_)).then_some((*s, *value)).filter(|(_, value)| *value != 0.0)
+            })
+            .collect();
         if moved < SPECK {
             return;
         }
@@ -236,12 +248,12 @@ impl MixtureState {
         let emptied = share >= 1.0 - 1e-9;
         if emptied {
             let left = Rc::make_mut(&mut self.mixtures[from.0 as usize]);
-            left.values_mut().for_each(|e| e.residue = true);
+            left.iter_mut().filter(|(s, _)| !staying.contains_key(s)).for_each(|(_, e)| e.residue = true);
         }
         let target = Rc::make_mut(&mut self.mixtures[to.0 as usize]);
         for (s, entry) in source.iter() {
             // What stuck to the walls of the source is not worth a history of its own.
-            if entry.residue {
+            if entry.residue || staying.get(s).is_some_and(|stays| *stays >= 1.0) {
                 continue;
             }
             let mut came = entry.came.clone();

@@ -91,17 +91,9 @@ fn own_laws(lab: &Elaborator<'_>, events: &[Event], library: &BTreeSet<FileId>) 
     for event in events {
         let Some(span) = own(event.span) else { continue };
         out.push((span, event.when));
-        out.extend(event.actions.iter().map(|action| (span, value_of(action))));
+        out.extend(event.actions.iter().flat_map(Action::sources).map(|node| (span, node)));
     }
     out
-}
-
-/// The value that an action goes by.
-fn value_of(action: &Action) -> NodeId {
-    match action {
-        Action::Assign { value, .. } => *value,
-        Action::Move { fraction, .. } => *fraction,
-    }
 }
 
 /// Finds watched values below others.
@@ -164,7 +156,7 @@ fn used_by(step: &PlanStep, library: &BTreeSet<FileId>) -> Vec<NodeId> {
         Step::Operation(o) => {
             out.extend(o.needs.iter().filter(|c| own(c)).map(|c| c.node));
             out.extend(o.until.iter().filter(|c| own(c)).map(|c| c.node));
-            out.extend(o.at_start.iter().chain(&o.at_end).map(value_of));
+            out.extend(o.at_start.iter().chain(&o.at_end).flat_map(Action::sources));
         }
         Step::Skill { needs, invariants, promises, .. } => {
             let asked = needs.iter().map(|c| &**c).chain(invariants).chain(promises);

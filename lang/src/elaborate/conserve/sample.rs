@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::model::{Action, Domain};
+use matterix_ir::model::{Action, Domain, Kept};
 use matterix_ir::{NodeId, Op};
 
 use crate::eval::lab::Elaborator;
@@ -71,21 +71,24 @@ impl<'l, 'a> Point<'l, 'a> {
                     let value = self.value(*value);
                     self.written.insert(*state, value);
                 }
-                Action::Move { fraction, from, to, .. } => {
+                Action::Move { fraction, but, from, to, .. } => {
                     let share = self.value(*fraction);
-                    self.transfer(share, *from, *to);
+                    self.transfer(share, but, *from, *to);
                 }
             }
         }
         self.written.values().all(|v| v.is_finite())
     }
 
-    fn transfer(&mut self, share: f64, from: u32, to: u32) {
+    fn transfer(&mut self, share: f64, but: &[Kept], from: u32, to: u32) {
         let lab = self.lab;
         let ends = lab.mixtures.get(from as usize).zip(lab.mixtures.get(to as usize));
         let Some((from, to)) = ends.filter(|(a, b)| a != b) else { return };
+        let stays: Vec<f64> =
+            but.iter().map(|k| k.stays.of(self.state(k.state), self.value(k.stays.source()))).collect();
         for (key, source) in lab.extensive.iter().filter(|(k, _)| k.instance == *from) {
-            let moved = share * self.state(*source);
+            let stays = but.iter().position(|k| k.state == *source).map_or(0.0, |i| stays[i]);
+            let moved = share * (self.state(*source) - stays);
             self.written.insert(*source, self.state(*source) - moved);
             let there = crate::eval::lab::ExtensiveKey { instance: *to, ..key.clone() };
             if let Some(target) = lab.extensive.get(&there) {

@@ -61,8 +61,8 @@ impl Course<'_> {
         for action in actions {
             let (state, value) = match action {
                 Action::Assign { state, value, .. } => (state, value),
-                Action::Move { fraction, from, to, .. } => {
-                    self.values.transfer(&program.model, *fraction, *from, *to);
+                Action::Move { fraction, but, from, to, .. } => {
+                    self.values.transfer(&program.model, *fraction, but, *from, *to);
                     continue;
                 }
             };

@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use matterix_ir::graph::{BinaryOp, UnaryOp, binary, unary};
 use matterix_ir::interval;
-use matterix_ir::model::{Action, Domain, Model};
+use matterix_ir::model::{Action, Domain, Kept, Model};
 use matterix_ir::pages::Pages;
 use matterix_ir::plan::{Motion, Operation, Step};
 use matterix_ir::values::{Bounds, Formulas, Rules};
@@ -85,20 +85,25 @@ impl Values {
                     let value = out.value(model, *value);
                     out.set(*state, value);
                 }
-                Action::Move { fraction, from, to, .. } => out.transfer(model, *fraction, *from, *to),
+                Action::Move { fraction, but, from, to, .. } => out.transfer(model, *fraction, but, *from, *to),
             }
         }
         out
     }
 
     /// Part of one mixture goes into another one: of the amounts that are followed, where the part is known.
-    pub fn transfer(&mut self, model: &Model, fraction: NodeId, from: u32, to: u32) {
+    pub fn transfer(&mut self, model: &Model, fraction: NodeId, but: &[Kept], from: u32, to: u32) {
         let share = self.value(model, fraction);
+        let kept: Vec<(Kept, Option<f64>)> = but.iter().map(|k| (*k, self.value(model, k.stays.source()))).collect();
         let mixture = |index: u32| model.mixtures.get(index as usize).map_or(&[][..], |m| m.extensive.as_slice());
         for (name, state) in mixture(from) {
             let into = mixture(to).iter().find(|(other, _)| other == name).map(|(_, into)| *into);
             let known = |state: u32| self.by_state.get(state as usize).copied().flatten();
-            let moved = known(*state).zip(share).map(|(there, share)| there * share);
+            let stays = |there: f64| match kept.iter().find(|(kept, _)| kept.state == *state) {
+                Some((kept, value)) => value.and_then(|value| kept.amount(there, value)),
+                None => Some(0.0),
+            };
+            let moved = known(*state).zip(share).and_then(|(there, share)| Some((there - stays(there)?) * share));
             let left = known(*state).zip(moved).map(|(there, moved)| there - moved);
             let got = into.and_then(known).zip(moved).map(|(there, moved)| there + moved);
             if self.follows(model, *state) {

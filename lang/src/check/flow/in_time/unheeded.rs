@@ -42,7 +42,7 @@ impl Interpreter<'_, '_> {
 
     /// What an action changes by some states.
     fn carried(&mut self, action: &Action, by: &BTreeSet<u32>) -> Vec<u32> {
-        let rests = self.parts(action.source()).states.iter().any(|s| by.contains(s));
+        let rests = action.sources().any(|node| self.parts(node).states.iter().any(|s| by.contains(s)));
         match action {
             Action::Assign { state, .. } if rests => vec![*state],
             Action::Assign { .. } => Vec::new(),
