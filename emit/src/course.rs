@@ -82,7 +82,9 @@ impl<'p> Course<'p> {
                     self.states.insert(*state);
                 }
             }
-            Action::Move { .. } if action.sources().any(|node| self.is_open(node)) => self.states.extend(written(self.model, action)),
+            Action::Move { .. } if action.sources().any(|node| self.is_open(node)) => {
+                self.states.extend(written(self.model, action))
+            }
             Action::Move { from, to, .. } => {
                 let extensive =
                     |i: &u32| self.model.mixtures.get(*i as usize).map(|m| m.extensive.as_slice()).unwrap_or_default();

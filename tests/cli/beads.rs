@@ -272,17 +272,20 @@ capability Tagged",
 
 #[test]
 fn an_event_holds_back_as_a_step_does() {
-    let text = bench(SAND, "    wait 2 s\n    expect b.contents.amount[sand] == 0 mol and b.contents.volume in 9.999 mL .. 10.001 mL")
-        .replace(
-            "asset Buchner",
-            "event tips_over(p: Pouring) when elapsed >= 1 s { move(10 mL, from: p.a, to: p.b, but: each(s in [sand]: 1)) }
+    let text = bench(
+        SAND,
+        "    wait 2 s\n    expect b.contents.amount[sand] == 0 mol and b.contents.volume in 9.999 mL .. 10.001 mL",
+    )
+    .replace(
+        "asset Buchner",
+        "event tips_over(p: Pouring) when elapsed >= 1 s { move(10 mL, from: p.a, to: p.b, but: each(s in [sand]: 1)) }
 capability Pouring: Body {
     param a: Container
     param b: Container
 }
 asset Stand: Pouring { mass: 1 kg }
 asset Buchner",
-        )
-        .replace("    paper = ", "    stand = Stand { a: a, b: b } at (0, 500, 0) mm\n    paper = ");
+    )
+    .replace("    paper = ", "    stand = Stand { a: a, b: b } at (0, 500, 0) mm\n    paper = ");
     passes("filter_event", text);
 }

@@ -431,7 +431,9 @@ impl Action {
     /// What its effects change.
     pub fn uses(&self) -> Vec<Thing> {
         match *self {
-            Action::Drip(_, a, b) | Action::Tip(_, a, b) | Action::Strain(_, a, b) => vec![Thing::Cup(a), Thing::Cup(b)],
+            Action::Drip(_, a, b) | Action::Tip(_, a, b) | Action::Strain(_, a, b) => {
+                vec![Thing::Cup(a), Thing::Cup(b)]
+            }
             Action::Double(..) => Vec::new(),
             Action::Cap(c) | Action::Uncap(c) => vec![Thing::Cup(c)],
             Action::Fire(o) | Action::Quench(o) | Action::Open(o) | Action::Close(o) => vec![Thing::Oven(o)],

@@ -125,12 +125,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// How much of a quantity of the whole mixture stays with the species that do.
-    fn amount_held(
-        &mut self,
-        key: &ExtensiveKey,
-        shares: &BTreeMap<SpeciesId, NodeId>,
-        at: Span,
-    ) -> Option<NodeId> {
+    fn amount_held(&mut self, key: &ExtensiveKey, shares: &BTreeMap<SpeciesId, NodeId>, at: Span) -> Option<NodeId> {
         let law = self.members_of(key.instance, &key.member).first().copied().and_then(|m| {
             let MemberKind::Value { options, .. } = &m.member.kind else { return None };
             let option = options.iter().find(|o| o.name.text == OF_EACH)?;
@@ -138,7 +133,8 @@ impl<'a> Elaborator<'a> {
             self.lookup(m.module, name)
         });
         let Some(law) = law else {
-            let headline = format!("what part of `{}` stays with the species that are held back is not known", key.member);
+            let headline =
+                format!("what part of `{}` stays with the species that are held back is not known", key.member);
             let d = Diagnostic::error(codes::UNSUPPORTED, at, headline, "cannot be divided");
             let help = format!(
                 "name the function of a mixture and a species that says so at its declaration: `{{ {OF_EACH}: \"...\" }}`"

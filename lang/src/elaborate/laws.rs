@@ -603,7 +603,9 @@ impl<'a> Elaborator<'a> {
             Some(but) if rate => {
                 let headline = "holding something back from a transfer with a rate is not supported yet";
                 let d = Diagnostic::error(codes::UNSUPPORTED, but.span, headline, "not supported yet");
-                self.report(d.help("move it in an event or an effect, or write what flows as rates of amounts and heat"));
+                self.report(
+                    d.help("move it in an event or an effect, or write what flows as rates of amounts and heat"),
+                );
                 return None;
             }
             Some(but) => self.held_back(but, from, scope)?,

@@ -392,7 +392,9 @@ impl Interpreter<'_, '_> {
                     let rest = held.with_ends((1.0 - of_least) * least, (1.0 - of_most) * most);
                     (held.with_ends(of_least * least, of_most * most), rest)
                 }
-                None if stays.is_some() => stays.map_or((AbstractValue::Point(0.0), held.clone()), |s| s.part(&fraction, held)),
+                None if stays.is_some() => {
+                    stays.map_or((AbstractValue::Point(0.0), held.clone()), |s| s.part(&fraction, held))
+                }
                 None => {
                     // A share of what is there leaves the rest: exact where the share is.
                     let kept = match fraction.exact() {
