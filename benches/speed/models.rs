@@ -53,6 +53,10 @@ impl Observer for Follower {
         self.1.sample(&mut self.0, time, engine, changed);
     }
 
+    fn begun(&mut self, time: f64, engine: &Engine<'_>) {
+        self.1.begin(&mut self.0, time, engine);
+    }
+
     fn event(&mut self, time: f64, event: usize) {
         self.0.event(time, event);
     }

@@ -138,10 +138,6 @@ pub fn of_function(word: &str) -> Option<&'static str> {
     })
 }
 
-/// What is written in place of going through a range.
-pub const OF_RANGE: &str =
-    "write `repeat 3 times { }`, a list `[1, 2, 3]`, or wells: `plate.wells`, `plate.column(1)`, `plate[A1 .. A12]`";
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -170,6 +170,10 @@ impl Observer for Follower<'_, '_> {
         self.progress.moved(time);
     }
 
+    fn begun(&mut self, time: f64, engine: &Engine<'_>) {
+        self.sampler.begin(&mut self.recording, time, engine);
+    }
+
     fn curve(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
         self.sampler.sample(&mut self.recording, time, engine, changed);
     }

@@ -54,3 +54,43 @@ fn a_pcr_of_96_wells_leaves_under_10_mb() {
     let all = first + (more - first) / 2 * 29;
     assert!(all < 10_000_000, "{first} bytes of one cycle, {more} of three: {all} of thirty");
 }
+
+/// The first value of a column of the states.
+fn first_of(states: &str, column: &str) -> f64 {
+    let mut lines = states.lines();
+    let head = lines.next().expect("a head");
+    let at = head.split(',').position(|name| name.trim_matches('"') == column).expect("the column is there");
+    let first = lines.filter_map(|line| line.split(',').nth(at)).find(|cell| !cell.is_empty());
+    first.expect("a value").parse().expect("a number")
+}
+
+#[test]
+fn a_recording_begins_with_what_is_there_once_salts_are_ions() {
+    let dir = folder("recorded_first");
+    let text = "mtx 1
+use std::glassware::Beaker50mL
+solution saline { NaCl: 0.9 %w/w, water: rest }
+lab bench { ambient: 22 degC, cup = Beaker50mL at (0, 0, 0) m holding 10 mL of saline }
+workflow rest in bench { wait 10 s }
+study seen of rest {
+    vary cup.initial[saline] in 9 mL .. 10 mL
+    runs 2
+    report most = max_over_time(cup.contents.volume) as mL
+    report now = cup.contents.volume as mL
+}
+";
+    write(&dir, "a.mtx", text);
+    let ended = matterixc_in(&dir, &["run", "a.mtx", "--out", "out", "--csv"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let states = fs::read_to_string(dir.join("out/states.csv")).expect("a table");
+    let volume = first_of(&states, "cup.contents.volume [mL]");
+    assert!((volume - 10.0).abs() < 1e-6, "{volume}");
+    let salt = first_of(&states, "cup.contents.amount[Na+] [mmol]");
+    assert!(salt > 1.0, "{salt}");
+    // What is kept over the time of a run begins there too.
+    let ended = matterixc_in(&dir, &["study", "a.mtx", "--out", "many"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let table = fs::read_to_string(dir.join("many/study.csv")).expect("a table");
+    let (most, now) = (first_of(&table, "most [mL]"), first_of(&table, "now [mL]"));
+    assert!(now > 8.9 && (most - now).abs() < 1e-6, "{most} {now}");
+}

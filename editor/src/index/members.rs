@@ -45,8 +45,9 @@ const OF_REACTION: &[(&str, &str)] = &[
 /// What can be asked of a list.
 const OF_LIST: &[(&str, &str)] = &[
     ("count", "how many there are"),
-    ("first", "the first one"),
-    ("last", "the last one"),
+    ("first", "the first one; `first(8)`: the first eight"),
+    ("last", "the last one; `last(8)`: the last eight"),
+    ("flat", "one list of its elements, without lists in it"),
     ("pairs", "each with the next: `pair.first`, `pair.second`"),
 ];
 
@@ -101,6 +102,7 @@ impl Index {
                 let found = known(OF_LIST, name).or_else(|| known(OF_GRID, name))?;
                 let sort = match name {
                     "first" | "last" | "well" => (**inner).clone(),
+                    "flat" => Sort::List(Box::new(innermost(inner).clone())),
                     "pairs" => Sort::List(Box::new(Sort::Tuple(vec![(**inner).clone(), (**inner).clone()]))),
                     "rows" | "columns" => Sort::List(Box::new(base.clone())),
                     "row" | "column" => base.clone(),
@@ -357,4 +359,12 @@ impl Index {
 fn known(all: &[(&str, &'static str)], name: &str) -> Option<Member> {
     let (name, what) = all.iter().find(|(n, _)| *n == name)?;
     Some(Member { name: (*name).to_string(), meaning: Meaning::Language(what), sort: Sort::Any })
+}
+
+/// What stands in a list of lists in the end.
+fn innermost(sort: &Sort) -> &Sort {
+    match sort {
+        Sort::List(inner) => innermost(inner),
+        other => other,
+    }
 }

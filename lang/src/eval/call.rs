@@ -3,7 +3,7 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 
-use super::{Num, Scope, Value};
+use super::{Decided, Num, Scope, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Name, Param};
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::external::AS_PUT;
@@ -32,6 +32,11 @@ pub enum KnownArgument {
     Number(NodeId, Dimension, bool, bool, Option<String>),
 }
 
+/// Whether a member of a list is one of its ends, of which several may be asked for.
+fn is_end(name: &Name) -> bool {
+    matches!(name.text.as_str(), "first" | "last")
+}
+
 impl<'a> Elaborator<'a> {
     /// `f(a, b: c)`.
     pub fn call(&mut self, callee: &'a Expr, args: &'a [Arg], span: Span, scope: &mut Scope) -> Value {
@@ -54,6 +59,16 @@ impl<'a> Elaborator<'a> {
                     return Value::Error;
                 }
             },
+            ExprKind::Member(base, name) if is_end(name) => {
+                let base = self.expr(base, scope);
+                match (self.listed(base.clone()), args) {
+                    (Value::List(items), [Arg { name: None, value }]) => {
+                        let n = self.expr(value, scope);
+                        return self.end_of(items, name.text == "first", n, value.span);
+                    }
+                    _ => self.member(base, name),
+                }
+            }
             _ => self.expr(callee, scope),
         };
         match f {
@@ -379,12 +394,10 @@ impl<'a> Elaborator<'a> {
             (Value::Instance(_), "basis", _) => Value::Error,
             (Value::Grid(id, grid), _, [Value::Num(n)]) => {
                 let at = args.first().map_or(span, |a| a.value.span);
-                match self.known(n.node) {
-                    Some(number) => self.grid_call(id, grid, name, number, at),
-                    None => {
-                        self.report(crate::declare::types::unsupported(at, "places known only when running"));
-                        Value::Error
-                    }
+                match self.number_before_run(n.node, "a place", at) {
+                    Decided::Now(number) => self.grid_call(id, grid, name, number, at),
+                    Decided::Later if self.prototype => self.grid_call(id, grid, name, 1.0, at),
+                    Decided::Later | Decided::ByRun => Value::Error,
                 }
             }
             _ => self.wrong_arguments(name, span),

@@ -2,7 +2,7 @@
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::{Num, Value};
+use super::{Num, Value, known_too_late};
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
 use crate::near;
@@ -76,6 +76,10 @@ impl Elaborator<'_> {
             }
             (Value::Tuple(items), Type::Color) if items.len() == 3 => {
                 Value::Tuple(items.into_iter().map(|i| self.coerce(i, &Type::ratio(), span, what)).collect())
+            }
+            (Value::InstanceNode(_), Type::List(_)) => {
+                self.report(known_too_late(&format!("`{what}`"), span));
+                Value::Error
             }
             (other, _) => {
                 let expected = self.tables.type_name(ty);
@@ -216,9 +220,5 @@ fn flattened(items: Vec<Value>, inner: &Type) -> Vec<Value> {
     if matches!(inner, Type::List(_) | Type::Any) || !items.iter().any(|i| matches!(i, Value::List(_))) {
         return items;
     }
-    let one = |item| match item {
-        Value::List(items) => flattened(items, inner),
-        other => vec![other],
-    };
-    items.into_iter().flat_map(one).collect()
+    items.into_iter().flat_map(Value::flat).collect()
 }

@@ -10,7 +10,6 @@ use crate::declare::ReactionId;
 use crate::declare::units::unit_error;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::observed::Noting;
-use crate::hints;
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -56,10 +55,7 @@ impl<'a> Elaborator<'a> {
             }
             ExprKind::IndexRange(base, a, b) => {
                 let base = self.expr(base, scope);
-                match self.grid_index(&base, a, Some(b)) {
-                    Some(found) => found,
-                    None => self.expected("a plate or another grid", &base, a.span.to(b.span)),
-                }
+                self.slice_named(base, a, b, scope)
             }
             ExprKind::Index(base, index) => {
                 let base = self.expr(base, scope);
@@ -99,20 +95,34 @@ impl<'a> Elaborator<'a> {
             }
             ExprKind::Tuple(items, unit) => self.tuple(items, unit.as_ref(), scope),
             ExprKind::List(items) => {
-                let values: Vec<Value> = items.iter().map(|i| self.expr(i, scope)).collect();
-                self.alike(&values, items);
-                self.spend_on_items(values.len());
-                Value::List(values)
+                let values = items.iter().map(|i| (self.expr(i, scope), i.span)).collect();
+                self.list_of(values)
             }
         }
     }
 
+    /// `[a, b]`. A grid is the list of its children; lists beside things are one list with these: `[plate.row(1), plate[A2]]`.
+    pub fn list_of(&mut self, values: Vec<(Value, Span)>) -> Value {
+        let values: Vec<_> = values.into_iter().map(|(value, span)| (self.listed(value), span)).collect();
+        let lists = values.iter().filter(|(value, _)| matches!(value, Value::List(_))).count();
+        let values = match lists {
+            0 => values,
+            all if all == values.len() => values,
+            _ => {
+                values.into_iter().flat_map(|(value, span)| value.flat().into_iter().map(move |v| (v, span))).collect()
+            }
+        };
+        self.alike(&values);
+        self.spend_on_items(values.len());
+        Value::List(values.into_iter().map(|(value, _)| value).collect())
+    }
+
     /// Reports the first element of a list that is of another kind than those before it.
-    fn alike(&mut self, values: &[Value], items: &[Expr]) {
+    fn alike(&mut self, values: &[(Value, Span)]) {
         let mut first: Option<(&Value, Span)> = None;
-        for (value, item) in values.iter().zip(items) {
+        for (value, span) in values {
             let Some((one, at)) = first else {
-                first = (*value != Value::Error).then_some((value, item.span));
+                first = (*value != Value::Error).then_some((value, *span));
                 continue;
             };
             let alike = match (one, value) {
@@ -138,8 +148,7 @@ impl<'a> Elaborator<'a> {
             } else {
                 codes::TYPE_MISMATCH
             };
-            let d =
-                Diagnostic::error(code, item.span, format!("a list of {a} cannot hold {b}"), format!("this is {b}"));
+            let d = Diagnostic::error(code, *span, format!("a list of {a} cannot hold {b}"), format!("this is {b}"));
             self.report(d.because(at, format!("this is {a}")));
             return;
         }
@@ -656,9 +665,14 @@ impl<'a> Elaborator<'a> {
         {
             return Some((0..self.tables.reactions.len() as u32).map(|r| Value::Reaction(ReactionId(r))).collect());
         }
+        if let ExprKind::Range(from, to) = &*e.kind {
+            let (low, high) = (self.expr(from, scope), self.expr(to, scope));
+            return self.whole_numbers(low, high, from.span, to.span);
+        }
         let value = self.expr(e, scope);
         match self.listed(value) {
             Value::List(items) => Some(items),
+            Value::Range(low, high) => self.elements_of(*low, *high, e.span),
             Value::Kind(kind) => {
                 if scope.lab {
                     self.gone_through.insert(kind);
@@ -667,10 +681,7 @@ impl<'a> Elaborator<'a> {
             }
             Value::Error => None,
             other => {
-                let help = match other {
-                    Value::Range(..) => hints::OF_RANGE,
-                    _ => "write a list `[a, b]`, a capability, or a set such as `plate.columns` or `m.species`",
-                };
+                let help = "write a list `[a, b]`, numbers `1 .. 12`, a capability, or a set such as `plate.columns` or `m.species`";
                 let headline = format!("cannot loop over {}", other.what());
                 let place = "not a list or a finite set";
                 self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, place).help(help));

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use matterix_ir::equilibrium::Part;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::study::Keep;
-use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
+use matterix_ir::{BinaryOp, Diagnostic, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::ItemKind;
@@ -469,46 +469,6 @@ impl Elaborator<'_> {
         Value::Bool(self.graph.number(f64::from(u8::from(truth))))
     }
 
-    fn choose(&mut self, c: NodeId, a: Value, b: Value, at: Span) -> Value {
-        let (a, b) = (self.listed(a), self.listed(b));
-        // Lists cannot be chosen between in a run; where the arguments decide, they need not be.
-        if let (Value::List(_), Value::List(_)) = (&a, &b)
-            && let Some(truth) = if self.prototype { Some(1.0) } else { self.known(c) }
-        {
-            return if truth != 0.0 { a } else { b };
-        }
-        match (a, b) {
-            (Value::Num(a), Value::Num(b)) => {
-                if !a.dimension.agrees(&b.dimension)
-                    || (a.point != b.point && !a.dimension.is_any() && !b.dimension.is_any())
-                {
-                    let (x, y) = (self.describe(&a), self.describe(&b));
-                    self.report(Diagnostic::error(
-                        codes::UNIT_MISMATCH,
-                        at,
-                        format!("both choices must have the same dimension, not {x} and {y}"),
-                        "different dimensions",
-                    ));
-                    return Value::Error;
-                }
-                let node = self.graph.select(c, a.node, b.node);
-                let dimension = if a.dimension.is_any() { b.dimension } else { a.dimension };
-                Value::Num(Num { node, dimension, point: a.point || b.point, unit: a.unit, literal: false })
-            }
-            (Value::Bool(a), Value::Bool(b)) => Value::Bool(self.graph.select(c, a, b)),
-            (Value::Tuple(a), Value::Tuple(b)) if a.len() == b.len() => {
-                let pairs: Vec<_> = a.into_iter().zip(b).collect();
-                Value::Tuple(pairs.into_iter().map(|(a, b)| self.choose(c, a, b, at)).collect())
-            }
-            (Value::Error, _) | (_, Value::Error) => Value::Error,
-            (a, b) if is_instance(&a) && is_instance(&b) => {
-                let (Some(a), Some(b)) = (self.value_node(&a), self.value_node(&b)) else { return Value::Error };
-                Value::InstanceNode(self.graph.select(c, a, b))
-            }
-            (a, _) => self.expected("two alike values", &a, at),
-        }
-    }
-
     fn stated(&mut self, id: DeclId, what: &str) -> Value {
         let names = self.tables.names;
         let ItemKind::Material { fields, .. } = &names.decl(id).item.kind else { return Value::Error };
@@ -557,9 +517,4 @@ impl Elaborator<'_> {
             .find(|(label, _)| words.split(' ').any(|w| w == label))
             .map_or(Value::Nothing, |(_, on)| Value::Instance(*on))
     }
-}
-
-/// Whether a value is an instance, or none, known now or when running.
-fn is_instance(value: &Value) -> bool {
-    matches!(value, Value::Instance(_) | Value::Qualified(..) | Value::InstanceNode(_) | Value::Nothing)
 }

@@ -3,7 +3,7 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 
-use super::Value;
+use super::{Decided, Value};
 use crate::eval::lab::Elaborator;
 
 impl Elaborator<'_> {
@@ -16,9 +16,13 @@ impl Elaborator<'_> {
                 _ => None,
             })
             .collect();
-        if let Some(number) = self.known(n)
-            && number >= 1.0
-            && number.fract() == 0.0
+        let number = match self.before_run(n) {
+            Decided::Now(number) => Some(number),
+            Decided::Later if self.prototype => self.known(n),
+            Decided::Later => return Value::Error,
+            Decided::ByRun => None,
+        };
+        if let Some(number) = number.filter(|number| *number >= 1.0 && number.fract() == 0.0)
             && let Some(item) = items.get(number as usize - 1)
         {
             return item.clone();
@@ -61,20 +65,21 @@ impl Elaborator<'_> {
 
     /// A list in groups of a whole number of elements; the last may have fewer.
     pub fn grouped(&mut self, items: &[Value], n: NodeId, at: Span) -> Value {
-        match self.known(n) {
-            Some(size) if size >= 1.0 && size.fract() == 0.0 => {
+        match self.number_before_run(n, "the size of a group", at) {
+            Decided::Now(size) if size >= 1.0 && size.fract() == 0.0 => {
                 Value::List(items.chunks(size as usize).map(|group| Value::List(group.to_vec())).collect())
             }
-            _ if self.prototype => Value::List(vec![Value::List(items.to_vec())]),
-            _ => {
+            Decided::Now(_) => {
                 self.report(Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     at,
-                    "the size of a group must be a whole number from 1, known before the run",
+                    "the size of a group must be a whole number from 1",
                     "not such a number",
                 ));
                 Value::Error
             }
+            Decided::Later if self.prototype => Value::List(vec![Value::List(items.to_vec())]),
+            Decided::Later | Decided::ByRun => Value::Error,
         }
     }
 

@@ -7,14 +7,13 @@ use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, Op, Span, codes};
 
-use super::{Num, Scope, Value};
+use super::{Decided, Num, Scope, Value, known_too_late};
 use crate::ast::{Expr, ExprKind, FieldValue, ItemKind, MemberKind, Name, NamedExpr, Role};
 use crate::declare::Tables;
 use crate::declare::tables::MemberRef;
 use crate::declare::{SpeciesId, Type};
 use crate::eval::lab::Mode;
 use crate::eval::lab::free::Bound;
-use crate::eval::lab::grids::Place;
 use crate::eval::lab::instances::Setting;
 use crate::eval::lab::written::GEOMETRY;
 use crate::eval::lab::{Elaborator, MemberKey};
@@ -42,10 +41,7 @@ impl<'a> Elaborator<'a> {
                 _ => self.no_member(&Value::Range(low, high), name, vec!["min".into(), "max".into()]),
             },
             Value::InstanceNode(_) => {
-                self.report(crate::declare::types::unsupported(
-                    name.span,
-                    "members of an instance known only when running",
-                ));
+                self.report(known_too_late(&format!("the thing whose `{}` is used", name.text), name.span));
                 Value::Error
             }
             Value::Grid(id, grid) => match self.grid_member(id, grid, &name.text) {
@@ -69,15 +65,16 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// `.count`, `.first`, `.last` and `.pairs` of a list: each with the next.
+    /// `.count`, `.first`, `.last`, `.flat` (without lists in it) and `.pairs` (each with the next) of a list.
     fn list_member(&mut self, items: Vec<Value>, name: &Name) -> Value {
         let end = match name.text.as_str() {
             "count" => return self.number(items.len() as f64, Dimension::one(), false),
+            "flat" => return Value::List(Value::List(items).flat()),
             "pairs" => return Value::List(items.windows(2).map(|two| Value::Tuple(two.to_vec())).collect()),
             "first" => items.first(),
             "last" => items.last(),
             _ => {
-                let known = ["count", "first", "last", "pairs"].map(String::from).to_vec();
+                let known = ["count", "first", "flat", "last", "pairs"].map(String::from).to_vec();
                 return self.no_member(&Value::List(items), name, known);
             }
         };
@@ -613,12 +610,15 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// `list[2]`, counted from 0.
+    /// `list[2]`, counted from 0, and `list[2 .. 5]`.
     pub fn index_number(&mut self, base: Value, index: &'a Expr, scope: &mut Scope) -> Value {
-        if self.grid_of(&base).is_some() {
-            return self.numbered(base, index, scope);
+        if let ExprKind::Range(from, to) = &*index.kind {
+            return self.slice(base, from, to, scope);
         }
         let at = self.expr(index, scope);
+        if self.grid_of(&base).is_some() {
+            return self.grid_at(&base, at, index.span);
+        }
         match (&base, &at) {
             (Value::Error, _) | (_, Value::Error) => Value::Error,
             (Value::Method(..) | Value::Instance(_) | Value::Qualified(..), Value::Species(s)) => {
@@ -660,52 +660,24 @@ impl<'a> Elaborator<'a> {
         Value::Error
     }
 
-    /// `ot2.slot[3]`, `ot2.slot[1 .. 3]`: places that are numbers.
-    fn numbered(&mut self, base: Value, index: &'a Expr, scope: &mut Scope) -> Value {
-        let mut place = |this: &mut Self, e: &'a Expr| {
-            if let ExprKind::Name(n) = &*e.kind
-                && Place::parse(&n.text).is_some()
-            {
-                return Some(n.clone());
-            }
-            let v = this.expr(e, scope);
-            if let Value::Place(name) = v {
-                return Some(name);
-            }
-            match this.coerce(v, &Type::ratio(), e.span, "place") {
-                Value::Num(n) => {
-                    let number = this.graph.constant(n.node).map_or_else(|| "?".into(), |v| v.to_string());
-                    Some(Name { text: number, span: e.span })
-                }
-                _ => None,
-            }
-        };
-        let ExprKind::Range(from, to) = &*index.kind else {
-            let at = self.expr(index, scope);
-            return self.grid_at(&base, at, index.span);
-        };
-        match (place(self, from), place(self, to)) {
-            (Some(from), Some(to)) => self.grid_index(&base, &from, Some(&to)).unwrap_or(Value::Error),
-            _ => Value::Error,
-        }
-    }
-
     fn element(&mut self, base: Value, at: Value, span: Span) -> Value {
         let (Value::List(items) | Value::Tuple(items), Value::Num(n)) = (&base, &at) else {
             let wrong = if matches!(base, Value::List(_) | Value::Tuple(_)) { at } else { base };
             return self.expected("a list and a whole number", &wrong, span);
         };
-        match self.graph.constant(n.node) {
-            Some(v) if v >= 0.0 && v.fract() == 0.0 && (v as usize) < items.len() => items[v as usize].clone(),
-            _ => {
-                self.report(Diagnostic::error(
-                    codes::TYPE_MISMATCH,
-                    span,
-                    format!("the list has {} elements", items.len()),
-                    "out of range (the first is 0)",
-                ));
-                Value::Error
-            }
+        let (items, node) = (items.clone(), n.node);
+        let number = match self.number_before_run(node, "the number of an element", span) {
+            Decided::Now(number) => number,
+            // Whichever it is, it is of the kind of the first.
+            Decided::Later if self.prototype => return items.into_iter().next().unwrap_or(Value::Error),
+            Decided::Later | Decided::ByRun => return Value::Error,
+        };
+        let whole = number >= 0.0 && number.fract() == 0.0;
+        match items.get(number as usize).filter(|_| whole) {
+            Some(item) => item.clone(),
+            // One element stands for all of a list that is not known yet.
+            None if self.prototype && whole && items.len() == 1 => items[0].clone(),
+            None => self.no_element(&items, number, span),
         }
     }
 

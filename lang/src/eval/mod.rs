@@ -6,8 +6,10 @@
 mod adding;
 pub mod arith;
 pub mod call;
+mod choose;
 pub mod coerce;
 pub mod compare;
+mod decided;
 pub mod equilibrium;
 pub mod expr;
 pub mod external;
@@ -20,6 +22,7 @@ pub mod member;
 mod notes;
 pub mod reaction;
 mod rows;
+mod slices;
 mod table;
 mod texts;
 mod tilting;
@@ -32,6 +35,8 @@ use matterix_ir::scene::InstanceId;
 
 use crate::declare::Type;
 
+pub use choose::known_too_late;
+pub use decided::Decided;
 pub use lab::Elaborator;
 pub use tilting::Tilts;
 pub use value::{Num, Value};

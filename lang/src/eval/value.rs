@@ -90,6 +90,14 @@ impl Value {
         if let Value::Instance(id) = self { Some(*id) } else { None }
     }
 
+    /// A list without lists in it, in its order; anything else as a list of one.
+    pub fn flat(self) -> Vec<Value> {
+        match self {
+            Value::List(items) => items.into_iter().flat_map(Value::flat).collect(),
+            other => vec![other],
+        }
+    }
+
     /// What it is, for "expected ..., found ...".
     pub fn what(&self) -> &'static str {
         match self {

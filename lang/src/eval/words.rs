@@ -25,9 +25,7 @@ impl<'a> Elaborator<'a> {
         match (ty, &*e.kind) {
             (Type::Enum(words), _) => self.word(e, words, scope),
             (Type::Place, ExprKind::Text(text)) => Value::Place(Name { text: text.clone(), span: e.span }),
-            (Type::Place, ExprKind::Name(n)) if Place::parse(&n.text).is_some() && scope.var(&n.text).is_none() => {
-                Value::Place(n.clone())
-            }
+            (Type::Place, ExprKind::Name(n)) => self.hinted_name(n, ty, scope),
             (Type::List(inner), ExprKind::List(items)) if matches!(**inner, Type::Enum(_)) => {
                 Value::List(items.iter().map(|i| self.hinted(i, inner, scope)).collect())
             }
@@ -35,11 +33,27 @@ impl<'a> Elaborator<'a> {
         }
     }
 
+    /// The value of a bare name where a type is expected, not yet compared with it.
+    pub fn hinted_name(&mut self, n: &Name, ty: &Type, scope: &mut Scope) -> Value {
+        match ty {
+            Type::Enum(words) => self.word_of(n, words, scope),
+            Type::Place if Place::parse(&n.text).is_some() && scope.var(&n.text).is_none() => Value::Place(n.clone()),
+            _ => self.name_of(n, scope),
+        }
+    }
+
     /// An expression where one of these words is expected. They go before other names.
     fn word(&mut self, e: &'a Expr, words: &Arc<[String]>, scope: &mut Scope) -> Value {
-        let ExprKind::Name(n) = &*e.kind else { return self.expr(e, scope) };
+        match &*e.kind {
+            ExprKind::Name(n) => self.word_of(n, words, scope),
+            _ => self.expr(e, scope),
+        }
+    }
+
+    /// A bare name where one of these words is expected.
+    fn word_of(&mut self, n: &Name, words: &Arc<[String]>, scope: &mut Scope) -> Value {
         if let Some(value) = self.word_named(&n.text, words) {
-            self.note_value(e.span, &value);
+            self.note_value(n.span, &value);
             return value;
         }
         if self.resolves(n, scope) {

@@ -13,7 +13,7 @@ use crate::ast::{
 };
 use crate::declare::Type;
 use crate::eval::lab::verbs::Verb;
-use crate::eval::{Scope, Value};
+use crate::eval::{Scope, Value, known_too_late};
 use crate::hints;
 use crate::names::{DeclId, names_of, verb_text};
 use crate::near;
@@ -33,16 +33,7 @@ impl<'a> Planner<'a, '_> {
     pub fn call(&mut self, call: &'a Call, span: Span, scope: &mut Scope) -> Option<(StepId, Option<Value>)> {
         let (verbs, count) = self.find_verb(call, scope)?;
         let said = self.said_of_sources(call, scope);
-        let bare = call.words.get(count);
-        let object = match (bare, &call.object) {
-            (Some(word), None) => {
-                let e = Expr { kind: Box::new(ExprKind::Name(word.clone())), span: word.span };
-                // A bare word is a name like any other; it is evaluated here because it has no expression of its own.
-                Some((self.name_value(&e, scope), word.span))
-            }
-            (None, Some(e)) => Some((self.lab.expr(e, scope), e.span)),
-            _ => None,
-        };
+        let object = self.object_of(&verbs, call, count, scope);
         if let Some((Value::Error, _)) = object {
             for (_, e) in &call.labelled {
                 self.lab.expr(e, scope);
@@ -81,8 +72,7 @@ impl<'a> Planner<'a, '_> {
         let d = match unknown {
             Some(at) => {
                 let thing = self.text(at);
-                let headline = format!("`{thing}` is chosen during the run, but `{verb}` needs a fixed thing");
-                Diagnostic::error(codes::UNSUPPORTED, at, headline, "not known before the run").help("name it directly")
+                known_too_late(&format!("`{thing}`"), at)
             }
             None => {
                 let headline = format!("`{verb}` does not work with these arguments: {}", first.headline);
@@ -94,16 +84,7 @@ impl<'a> Planner<'a, '_> {
 
     /// The argument of a call that is a thing known only when running.
     fn unknown_thing(&mut self, verb: &Verb<'a>, call: &'a Call, scope: &mut Scope) -> Option<Span> {
-        let sig = match verb {
-            Verb::Skill(id) => match &self.lab.tables.names.decl(*id).item.kind {
-                ItemKind::Skill { sig, .. } => sig,
-                _ => return None,
-            },
-            Verb::Command(_, m) => match &m.member.kind {
-                MemberKind::Command { sig, .. } => sig,
-                _ => return None,
-            },
-        };
+        let (sig, _) = self.signature(verb)?;
         let labelled = call.labelled.iter().filter(|(label, _)| has_label(sig, label)).map(|(_, e)| e);
         let found = call.object.iter().chain(labelled).find(|e| {
             let noted = self.lab.diagnostics.len();
@@ -114,11 +95,85 @@ impl<'a> Planner<'a, '_> {
         found.map(|e| e.span)
     }
 
-    fn name_value(&mut self, e: &Expr, scope: &mut Scope) -> Value {
-        let ExprKind::Name(n) = &*e.kind else { return Value::Error };
-        let value = self.lab.name_of(n, scope);
-        self.lab.note_value(n.span, &value);
-        value
+    /// What stands behind a verb, where the signatures of the verb may expect words or places.
+    fn object_of(
+        &mut self,
+        verbs: &[Verb<'a>],
+        call: &'a Call,
+        count: usize,
+        scope: &mut Scope,
+    ) -> Option<(Value, Span)> {
+        match (call.words.get(count), &call.object) {
+            (Some(word), None) => {
+                let types = self.types_of_object(verbs, std::slice::from_ref(word));
+                let value = match types.as_slice() {
+                    [ty] => self.lab.hinted_name(word, ty, scope),
+                    _ => self.lab.name_of(word, scope),
+                };
+                self.lab.note_value(word.span, &value);
+                Some((value, word.span))
+            }
+            (None, Some(e)) => {
+                let items = match &*e.kind {
+                    ExprKind::Tuple(items, None) => items.as_slice(),
+                    _ => std::slice::from_ref(e),
+                };
+                let names: Vec<Name> = items.iter().map(name_or_nothing).collect();
+                let types = self.types_of_object(verbs, &names);
+                let value = match types.as_slice() {
+                    [ty] => self.lab.hinted(items.first().unwrap_or(e), ty, scope),
+                    types if types.len() > 1 && types.len() == items.len() => {
+                        let values = items.iter().zip(types).map(|(e, ty)| self.lab.hinted(e, ty, scope));
+                        Value::Tuple(values.collect())
+                    }
+                    _ => self.lab.expr(e, scope),
+                };
+                Some((value, e.span))
+            }
+            _ => None,
+        }
+    }
+
+    /// The types of the parameters in front, of the first meaning of a verb that has as many and knows these words; if none
+    /// knows them, of the first that has as many.
+    fn types_of_object(&mut self, verbs: &[Verb<'a>], names: &[Name]) -> Vec<Type> {
+        let mut found: Option<Vec<Type>> = None;
+        for verb in verbs {
+            let Some((sig, module)) = self.signature(verb) else { continue };
+            if sig.params.len() != names.len() {
+                continue;
+            }
+            let types: Vec<Type> = sig
+                .params
+                .iter()
+                .map(|p| p.ty.as_ref().map_or(Type::Any, |ty| self.lab.resolve_parameter_type(ty, module)))
+                .collect();
+            let knows = |(ty, name): (&Type, &Name)| matches!(ty, Type::Enum(words) if words.contains(&name.text));
+            if types.iter().zip(names).any(knows) {
+                return types;
+            }
+            found.get_or_insert(types);
+        }
+        // A device may be named in its place.
+        let other = |verb: &Verb<'a>| self.signature(verb).is_some_and(|(sig, _)| sig.params.len() != names.len());
+        found.filter(|_| !verbs.iter().any(other)).unwrap_or_default()
+    }
+
+    /// The signature of a verb, and the module whose names it sees.
+    fn signature(&self, verb: &Verb<'a>) -> Option<(&'a Sig, usize)> {
+        match verb {
+            Verb::Skill(id) => {
+                let decl = self.lab.tables.names.decl(*id);
+                match &decl.item.kind {
+                    ItemKind::Skill { sig, .. } => Some((sig, decl.module)),
+                    _ => None,
+                }
+            }
+            Verb::Command(_, m) => match &m.member.kind {
+                MemberKind::Command { sig, .. } => Some((sig, m.module)),
+                _ => None,
+            },
+        }
     }
 
     /// The meanings of the longest declared verb that the words begin with, and its number of words.
@@ -261,16 +316,7 @@ impl<'a> Planner<'a, '_> {
         let text = verb_text(&call.words[..count]);
         let mut missing: Vec<String> = Vec::new();
         for verb in self.verbs(&text, scope.module) {
-            let sig = match &verb {
-                Verb::Skill(id) => match &self.lab.tables.names.decl(*id).item.kind {
-                    ItemKind::Skill { sig, .. } => sig,
-                    _ => continue,
-                },
-                Verb::Command(_, m) => match &m.member.kind {
-                    MemberKind::Command { sig, .. } => sig,
-                    _ => continue,
-                },
-            };
+            let Some((sig, _)) = self.signature(&verb) else { continue };
             let given = |label: &Name| call.labelled.iter().any(|(l, _)| l.text == label.text);
             missing.extend(sig.labelled.iter().map(|(l, _)| l).find(|l| !given(l)).map(|l| l.text.clone()));
         }
@@ -332,7 +378,20 @@ impl<'a> Planner<'a, '_> {
         if let Some(one) = chosen.first() {
             return Some(one.clone());
         }
-        self.no_such_device(&lacking, verb_span, call);
+        let by = call.labelled.iter().find(|(label, _)| label.text == "by").map(|(_, e)| e);
+        let named = match object {
+            Some((value @ (Value::InstanceNode(_) | Value::Error), at)) => Some((value.clone(), *at)),
+            _ => by.map(|e| (self.lab.expr(e, scope), e.span)),
+        };
+        match named {
+            // What is wrong with it has been said, or it is not known yet.
+            Some((Value::Error, _)) => {}
+            Some((Value::InstanceNode(_), at)) => {
+                let device = self.text(at);
+                self.lab.report(known_too_late(&format!("`{device}`"), at));
+            }
+            _ => self.no_such_device(&lacking, verb_span, call),
+        }
         None
     }
 
@@ -964,6 +1023,14 @@ impl<'a> Planner<'a, '_> {
                 Some((name.clone(), argument))
             })
             .collect()
+    }
+}
+
+/// The name that an expression is, if it is nothing more.
+fn name_or_nothing(e: &Expr) -> Name {
+    match &*e.kind {
+        ExprKind::Name(n) => n.clone(),
+        _ => Name { text: String::new(), span: e.span },
     }
 }
 

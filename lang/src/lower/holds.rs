@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Condition, Refusal, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
 use super::Planner;
-use crate::ast::{Call, Expr, ExprKind, Name};
+use crate::ast::{Binary, Call, Expr, ExprKind, Name};
 use crate::declare::SpeciesId;
 use crate::eval::lab::substances::Substance;
 use crate::eval::{Scope, Value};
@@ -23,15 +23,30 @@ impl<'a> Planner<'a, '_> {
     /// same call changes before it is its turn: of it nothing is asked.
     pub(super) fn said_of_sources(&mut self, call: &'a Call, scope: &mut Scope) -> Vec<Condition> {
         let arguments = || call.object.iter().chain(call.labelled.iter().map(|(_, e)| e));
-        let said: Vec<(&'a Expr, &'a Name)> = arguments().filter_map(of_what).collect();
         let source = call.labelled.iter().find(|(label, _)| label.text == SOURCE);
-        let (false, Some((_, from))) = (said.is_empty(), source) else { return Vec::new() };
+        let Some((_, from)) = source else { return Vec::new() };
+        let mut said: Vec<(&'a Expr, &'a Name)> = Vec::new();
+        for e in arguments() {
+            match of_what(e) {
+                Said::Nothing => {}
+                Said::Whole(parts, name) => {
+                    self.lab.looked_into.extend(parts);
+                    said.push((e, name));
+                }
+                Said::Part(parts, name) => {
+                    self.say_of_part(parts.first().copied().unwrap_or(e.span), name);
+                    self.lab.looked_into.extend(parts);
+                }
+            }
+        }
+        if said.is_empty() {
+            return Vec::new();
+        }
         let value = self.lab.expr(from, scope);
         let mut sources = self.mixtures_of(value);
         if sources.is_empty() {
             return Vec::new();
         }
-        self.lab.looked_into.extend(said.iter().map(|(e, _)| e.span));
         for (label, e) in &call.labelled {
             if label.text != SOURCE {
                 let value = self.lab.expr(e, scope);
@@ -48,6 +63,14 @@ impl<'a> Planner<'a, '_> {
             out.push(self.all_hold(&sources, &substance, name, e.span));
         }
         out
+    }
+
+    /// `of` behind a part of an amount: which of the two is meant cannot be told.
+    fn say_of_part(&mut self, part: Span, name: &Name) {
+        let (part_text, name) = (self.text(part), &name.text);
+        let headline = format!("`{part_text}` is only a part of the amount: `of {name}` is not checked");
+        let d = Diagnostic::warning(codes::MISPLACED, part, headline, "a part of the amount");
+        self.lab.report(d.help(format!("put the whole amount in brackets: `(...) of {name}`")));
     }
 
     fn all_hold(&mut self, sources: &BTreeSet<InstanceId>, what: &Substance, name: &Name, span: Span) -> Condition {
@@ -193,14 +216,40 @@ impl<'a> Planner<'a, '_> {
     }
 }
 
-/// `50 uL of dye`: the argument and the substance.
-fn of_what(e: &Expr) -> Option<(&Expr, &Name)> {
+/// What an amount says of its substance.
+enum Said<'a> {
+    Nothing,
+    /// All of it is of a substance; where that is said.
+    Whole(Vec<Span>, &'a Name),
+    /// A part of it, where another part may be of anything.
+    Part(Vec<Span>, &'a Name),
+}
+
+/// `50 uL of dye`; an `of` behind a sum or product is of all of it: `volume - share of dye`.
+fn of_what(e: &Expr) -> Said<'_> {
     match &*e.kind {
-        ExprKind::Of(_, name) => Some((e, name)),
+        ExprKind::Of(_, name) => Said::Whole(vec![e.span], name),
         ExprKind::Tuple(items, None) => match items.as_slice() {
             [one] => of_what(one),
-            _ => None,
+            _ => Said::Nothing,
         },
-        _ => None,
+        ExprKind::Binary(Binary::Add | Binary::Sub | Binary::Mul | Binary::Div, a, b) => {
+            match (of_what(a), of_what(b)) {
+                (Said::Nothing, said) | (said @ Said::Part(..), Said::Nothing) => said,
+                (Said::Whole(spans, name), Said::Nothing) => Said::Part(spans, name),
+                (Said::Whole(mut spans, name), Said::Whole(more, other)) if name.text == other.text => {
+                    spans.extend(more);
+                    Said::Whole(spans, name)
+                }
+                (
+                    Said::Whole(mut spans, name) | Said::Part(mut spans, name),
+                    Said::Whole(more, _) | Said::Part(more, _),
+                ) => {
+                    spans.extend(more);
+                    Said::Part(spans, name)
+                }
+            }
+        }
+        _ => Said::Nothing,
     }
 }

@@ -4,9 +4,9 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, codes};
 
 use super::Planner;
-use super::variables::Decided;
 use crate::ast::{Binary, Expr, ExprKind, Param};
 use crate::declare::Type;
+use crate::eval::Decided;
 use crate::eval::lab::free::Bound;
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
@@ -98,7 +98,7 @@ impl<'a> Planner<'a, '_> {
             self.lab.open.bound(op, Bound::AtMost, high);
         }
         let Some(found) = self.condition(condition, scope) else { return };
-        if matches!(self.decided(found.node), Decided::Now(0.0)) {
+        if matches!(self.lab.before_run(found.node), Decided::Now(0.0)) {
             let is = match &value {
                 Value::Num(n) => self.lab.glance(n.node).map(|v| format!("is {}", self.lab.unit_of(n).show(v))),
                 Value::Text(text) => Some(format!("is \"{text}\"")),

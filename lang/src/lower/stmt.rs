@@ -11,7 +11,7 @@ use super::variables::Undecided;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
 use crate::declare::Type;
 use crate::eval::lab::choices::Choice;
-use crate::eval::{Num, Scope, Value};
+use crate::eval::{Num, Scope, Value, known_too_late};
 use crate::task::Given;
 
 impl<'a> Planner<'a, '_> {
@@ -217,6 +217,10 @@ impl<'a> Planner<'a, '_> {
                 for a in assets {
                     match self.lab.expr(a, scope) {
                         Value::Instance(i) | Value::Qualified(i, _) => claims.push(i),
+                        Value::InstanceNode(_) => {
+                            let thing = self.text(a.span);
+                            self.lab.report(known_too_late(&format!("`{thing}`"), a.span));
+                        }
                         other => {
                             self.lab.expected("an instance to claim", &other, a.span);
                         }

@@ -2,12 +2,12 @@
 //! step, so that a run never sees them. Where only the run decides whether or how often a step is done, they cannot change.
 
 use matterix_ir::plan::StepId;
-use matterix_ir::{Diagnostic, NodeId, Op, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Planner;
 use crate::ast::{AssignOp, Binary, Block, Expr, Name, Stmt, StmtKind, Type as TypeText};
 use crate::declare::Type;
-use crate::eval::{Num, Scope, Value};
+use crate::eval::{Decided, Num, Scope, Value};
 use crate::near;
 
 /// Why only the run decides what is done in a block.
@@ -96,22 +96,6 @@ impl<'a> Planner<'a, '_> {
         blocks.into_iter().any(|block| any(&block.stmts, scope))
     }
 
-    /// A value known before the run, if all parameters that it depends on have one.
-    pub(super) fn decided(&mut self, node: NodeId) -> Decided {
-        let is_open = |planner: &Self, n: NodeId| match planner.lab.graph.op(n) {
-            Op::Param(i) => planner.lab.params[i as usize].value.is_nan(),
-            _ => false,
-        };
-        if let Some(value) = self.lab.graph.constant(node) {
-            return Decided::Now(value);
-        }
-        // Of a stand-in nothing is known yet.
-        if self.lab.prototype || self.lab.graph.schedule([node]).into_iter().any(|n| is_open(self, n)) {
-            return Decided::Later;
-        }
-        self.lab.known(node).map_or(Decided::ByRun, Decided::Now)
-    }
-
     /// `if` with branches that change names declared outside: only the branch that is taken is written out.
     pub(super) fn chosen_branch(
         &mut self,
@@ -123,7 +107,7 @@ impl<'a> Planner<'a, '_> {
         if !self.changes(std::iter::once(then).chain(otherwise), scope) {
             return None;
         }
-        match self.decided(condition) {
+        match self.lab.before_run(condition) {
             Decided::Now(truth) => {
                 let chosen = if truth != 0.0 { Some(then) } else { otherwise };
                 Some(chosen.map(|block| self.block(block, scope)))
@@ -142,7 +126,7 @@ impl<'a> Planner<'a, '_> {
         if !self.changes([body], scope) {
             return None;
         }
-        let count = match self.decided(times) {
+        let count = match self.lab.before_run(times) {
             Decided::Now(count) => count,
             Decided::Later => return Some(self.unknown_block(body, scope)),
             Decided::ByRun => return None,
@@ -325,14 +309,4 @@ impl<'a> Planner<'a, '_> {
         }
         self.lab.report(near::proposed(d, &near, name.span));
     }
-}
-
-/// What is known of a value while a plan is written out.
-pub(super) enum Decided {
-    /// The value.
-    Now(f64),
-    /// A parameter that it depends on has no value yet.
-    Later,
-    /// It depends on the run.
-    ByRun,
 }

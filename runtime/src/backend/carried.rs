@@ -97,6 +97,10 @@ impl Observer for Attendant<'_, '_> {
         self.out.leaves(time, engine, states);
     }
 
+    fn begun(&mut self, time: f64, engine: &Engine<'_>) {
+        self.out.begun(time, engine);
+    }
+
     fn event(&mut self, time: f64, event: usize) {
         self.out.event(time, event);
     }

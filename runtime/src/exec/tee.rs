@@ -27,6 +27,7 @@ impl Observer for Tee<'_> {
         sample(time: f64, engine: &Engine<'_>, changed: &[u32]);
         curve(time: f64, engine: &Engine<'_>, changed: &[u32]);
         leaves(time: f64, engine: &Engine<'_>, states: &[u32]);
+        begun(time: f64, engine: &Engine<'_>);
         event(time: f64, event: usize);
         process(time: f64, process: usize, running: bool);
         moved(time: f64, from: u32, to: u32, fraction: f64);

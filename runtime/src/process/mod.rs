@@ -117,6 +117,8 @@ pub trait Observer {
     fn curve(&mut self, _time: f64, _engine: &Engine<'_>, _changed: &[u32]) {}
     /// What these states, ascending, have followed since they were last shown is forgotten after this: only now can it be asked for.
     fn leaves(&mut self, _time: f64, _engine: &Engine<'_>, _states: &[u32]) {}
+    /// What happens at once at the start has happened: salts are dissolved. Samples before this show how things were put in.
+    fn begun(&mut self, _time: f64, _engine: &Engine<'_>) {}
     /// An event has fired, by its index in the model.
     fn event(&mut self, time: f64, event: usize);
     /// A process has begun or ceased to run, by its index in the model.
@@ -274,6 +276,7 @@ impl<'m> Engine<'m> {
     pub fn start(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
         self.settle(None, observer)?;
         self.show(observer);
+        observer.begun(self.time, self);
         Ok(())
     }
 

@@ -102,9 +102,13 @@ impl<'s> Watcher<'s> {
 impl Observer for Watcher<'_> {
     fn sample(&mut self, _: f64, engine: &Engine<'_>, changed: &[u32]) {
         let study = self.study;
-        let seen = self.seen.get_or_insert_with(|| Seen::begin(study, engine));
+        let Some(seen) = &mut self.seen else { return };
         let touched = seen.values.by(changed);
         seen.follow(study, engine, &touched);
+    }
+
+    fn begun(&mut self, _: f64, engine: &Engine<'_>) {
+        self.seen = Some(Seen::begin(self.study, engine));
     }
 
     fn leaves(&mut self, time: f64, engine: &Engine<'_>, states: &[u32]) {

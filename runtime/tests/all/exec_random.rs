@@ -273,6 +273,9 @@ impl Observer for Diary {
     fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
         self.sampler.sample(&mut self.recording, time, engine, changed);
     }
+    fn begun(&mut self, time: f64, engine: &Engine<'_>) {
+        self.sampler.begin(&mut self.recording, time, engine);
+    }
     fn event(&mut self, time: f64, event: usize) {
         self.says(time, event);
     }

@@ -36,8 +36,18 @@ impl Walk<'_> {
         for word in call.words.iter().skip(count) {
             self.name(word, &words);
         }
-        if let Some(object) = &call.object {
-            self.expr_among(object, &words);
+        match call.object.as_ref().map(|object| (object, &*object.kind)) {
+            Some((_, ExprKind::Tuple(items, None))) => {
+                let front: Vec<DefId> = params.iter().copied().filter(|p| self.index.def(*p).label.is_none()).collect();
+                for (item, param) in items.iter().zip(front.iter().map(Some).chain(std::iter::repeat(None))) {
+                    let words = param.map(|p| self.index.def(*p).words.clone()).unwrap_or_default();
+                    self.expr_among(item, &words);
+                }
+            }
+            Some((object, _)) => {
+                self.expr_among(object, &words);
+            }
+            None => {}
         }
         for (label, e) in &call.labelled {
             let group: Vec<DefId> = params

@@ -67,8 +67,14 @@ impl Walk<'_> {
             ExprKind::IndexWord(base, word) => self.index_word(base, word),
             ExprKind::IndexRange(base, a, b) => {
                 let base = self.expr(base);
-                self.language(a.span, "a place of the grid");
-                self.language(b.span, "a place of the grid");
+                for end in [a, b] {
+                    match self.find(end) {
+                        Some(_) => {
+                            self.name(end, words);
+                        }
+                        None => self.language(end.span, "a place of the grid"),
+                    }
+                }
                 Found::of(Sort::List(Box::new(self.index.element_of(&base.sort).unwrap_or(Sort::Any))))
             }
             ExprKind::Index(base, index) => match &*index.kind {
@@ -135,8 +141,12 @@ impl Walk<'_> {
                 }
             }
             ExprKind::List(items) => {
-                let mut found = items.iter().map(|i| self.expr_among(i, words)).collect::<Vec<_>>().into_iter();
-                let first = found.find(|f| f.sort != Sort::Any).map_or(Sort::Any, |f| f.sort);
+                let mut found: Vec<Found> = items.iter().map(|i| self.expr_among(i, words)).collect();
+                // Lists beside things are one list with these.
+                if found.iter().any(|f| matches!(f.sort, Sort::Thing(..))) {
+                    found.retain(|f| !matches!(f.sort, Sort::List(_)));
+                }
+                let first = found.into_iter().find(|f| f.sort != Sort::Any).map_or(Sort::Any, |f| f.sort);
                 let first = match first {
                     Sort::Thing(kinds, _) => Sort::Thing(kinds, None),
                     other => other,
@@ -149,7 +159,7 @@ impl Walk<'_> {
     /// What stands for each member of a set.
     pub(super) fn each(&self, set: &Sort) -> Sort {
         match set {
-            Sort::List(inner) => (**inner).clone(),
+            Sort::List(inner) | Sort::Range(inner) => (**inner).clone(),
             Sort::Kind(kind) => Sort::Thing(vec![*kind], None),
             _ => Sort::Any,
         }
@@ -410,6 +420,11 @@ impl Walk<'_> {
                         None => self.note(n.span, Meaning::Unknown),
                     },
                 }
+            }
+            ExprKind::Member(base, name) if matches!(name.text.as_str(), "first" | "last") => {
+                let base = self.expr(base);
+                self.member(&base.sort, name);
+                result = base;
             }
             _ => {
                 let callee = self.expr(callee);

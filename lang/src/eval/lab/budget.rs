@@ -89,6 +89,11 @@ impl Elaborator<'_> {
         self.take_stock();
     }
 
+    /// Whether the steps are used up, which was reported.
+    pub fn has_spent(&self) -> bool {
+        self.budget.over
+    }
+
     /// Adds steps for a list that is copied, with all lists in it.
     pub fn spend_on_list(&mut self, value: &Value) {
         let Value::List(items) = value else { return };

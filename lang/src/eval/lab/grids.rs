@@ -11,7 +11,7 @@ use super::Elaborator;
 use super::instances::Setting;
 use crate::ast::{self, AssetLine, Expr, FieldValue, Name};
 use crate::declare::Type;
-use crate::eval::{Scope, Value};
+use crate::eval::{Decided, Scope, Value};
 use crate::names::DeclId;
 
 /// More places than any plate has; what is beyond is a slip of the pen.
@@ -339,7 +339,7 @@ impl<'a> Elaborator<'a> {
         if let Some(e) = &line.row {
             let v = self.expr(e, &mut Scope::of(id, module));
             let Value::Num(n) = self.coerce(v, &Type::ratio(), e.span, "by") else { return None };
-            let count = self.graph.constant(n.node).filter(|v| *v >= 1.0 && v.fract() == 0.0);
+            let count = self.known(n.node).filter(|v| *v >= 1.0 && v.fract() == 0.0);
             let Some(count) = count else {
                 let headline = "the number of places in a row must be a whole number";
                 self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "not a whole number"));
@@ -469,17 +469,12 @@ impl<'a> Elaborator<'a> {
         if let Some(child) = self.stand_in_place(id, grid) {
             return Value::Instance(child);
         }
-        let Some(number) = self.known(n.node) else {
-            let headline = "a place must be known before the run";
-            let d = Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "depends on the run");
-            self.report(d.help("use a place such as `A1`, a number, or a `var` that counts"));
-            return Value::Error;
-        };
-        let of = &self.instances[id.0 as usize].grids[grid];
-        if !matches!(base, Value::Grid(..)) || !of.lettered() {
+        let Decided::Now(number) = self.number_before_run(n.node, "a place", span) else { return Value::Error };
+        if self.is_numbered(base) {
             let name = Name { text: number.to_string(), span };
             return self.grid_index(base, &name, None).unwrap_or(Value::Error);
         }
+        let of = &self.instances[id.0 as usize].grids[grid];
         let whole = number >= 0.0 && number.fract() == 0.0;
         if let Some(child) = of.children.values().nth(number as usize).filter(|_| whole) {
             return Value::Instance(*child);
@@ -488,6 +483,12 @@ impl<'a> Elaborator<'a> {
         let headline = format!("`{thing}` has {count} places, counted from 0: this is number {}", show_number(number));
         self.report(Diagnostic::error(codes::TYPE_MISMATCH, span, headline, "out of range (the first is 0)"));
         Value::Error
+    }
+
+    /// Whether what stands in `[ ]` behind a value is the name of a place, even where it is a number: not so in `plate.wells[3]`.
+    pub fn is_numbered(&self, base: &Value) -> bool {
+        let is_list = |id: &InstanceId, grid: &usize| self.instances[id.0 as usize].grids[*grid].lettered();
+        self.grid_of(base).is_some() && !matches!(base, Value::Grid(id, grid) if is_list(id, grid))
     }
 
     /// The grid that a value means.
