@@ -271,13 +271,13 @@ impl<'p> Screen<'p> {
         let mut states = engine.states();
         let mut changed = BTreeSet::new();
         for action in operation.at_start.iter().chain(&operation.at_end) {
-            match action {
-                &Action::Assign { state, value, .. } => {
+            match *action {
+                Action::Assign { state, value, .. } => {
                     let value = engine.eval_with(value, &states);
                     *states.get_mut(state as usize)? = value;
                     changed.insert(state);
                 }
-                &Action::Move { fraction, ref but, from, to, .. } => {
+                Action::Move { fraction, ref but, from, to, .. } => {
                     let held = Held::new(but, |s| states[s as usize], |node| engine.eval_with(node, &states)).ok()?;
                     let fraction = engine.eval_with(fraction, &states);
                     let mixtures = &engine.model().mixtures;

@@ -168,6 +168,7 @@ codes! {
     UNFINISHED "unfinished" "P1" "a workflow ends while a device is on or an arm holds something";
     TIP_USED "tip-used" "T2" "a used tip is picked up";
     NOT_EMPTY "not-empty" "P1" "a vessel that should be empty is not";
+    TAKES_LIQUID "takes-liquid" "T1" "an air gap is taken where the tip is in a liquid, or at its rack";
     TIP_NOT_EMPTY "tip-not-empty" "T1" "a tip is returned to its rack with liquid in it";
     WRONG_COLUMN "wrong-column" "T1" "the channels of a pipette do not match the wells";
     WRONG_SPOT "wrong-spot" "T1" "a tip is returned to another place than it came from";

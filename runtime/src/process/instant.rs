@@ -103,8 +103,8 @@ impl Engine<'_> {
         who: Option<&str>,
         observer: &mut dyn Observer,
     ) -> Result<(), Fault> {
-        match action {
-            &Action::Assign { state, value: node, span } => {
+        match *action {
+            Action::Assign { state, value: node, span } => {
                 let value = self.eval(node);
                 if !value.is_finite() {
                     return Err(self.no_effect(state, node, who, span));
@@ -113,7 +113,7 @@ impl Engine<'_> {
                 self.write(state, value);
                 Ok(())
             }
-            &Action::Move { fraction: node, ref but, from, to, span } => {
+            Action::Move { fraction: node, ref but, from, to, span } => {
                 let fraction = self.eval(node);
                 if !fraction.is_finite() {
                     return Err(self.no_share(node, false, who, span));
