@@ -286,13 +286,15 @@ impl File {
         made_of(self.inner_labware_geometry.get(well.geometry_definition_id.as_ref()?)?, well)
     }
 
-    /// What the newest version of the library says of the wells, where this version of the same labware has no sections.
+    /// What the newest version of the library says of the wells, where this version of the same labware has no sections. Tips have no inside, and
+    /// unpacking a definition takes time: it is done only where it may say more.
     fn newer_insides(&self) -> Insides {
-        if !self.inner_labware_geometry.is_empty() || self.namespace != library::NAMESPACE {
+        let is_told = self.parameters.is_tiprack || !self.inner_labware_geometry.is_empty();
+        if is_told || self.namespace != library::NAMESPACE {
             return Insides::default();
         }
-        let newest = library::find(&self.parameters.load_name).ok().and_then(|entry| entry.text().ok());
-        newest.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
+        let newest = library::find(&self.parameters.load_name).ok().filter(|entry| entry.version > self.version);
+        newest.and_then(|entry| entry.text().ok()).and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
     }
 
     /// The inside of a well in that version.

@@ -37,19 +37,18 @@ impl Uses {
     ) -> Uses {
         let mut uses = Uses::default();
         let mut finder = Finder { lab, watched: FxHashMap::default(), above: Vec::new(), known: FxHashMap::default() };
-        // A constant is the same node for all things that have it, so that its use does not say of which.
-        let tells = |node: &NodeId| !matches!(lab.graph.op(*node), Op::Const(_));
         for (i, hazard) in hazards.iter().enumerate() {
-            match hazard.watched {
-                Watched::Steps | Watched::Given(_) => {}
-                Watched::Value(node) => Some(node)
-                    .filter(tells)
-                    .into_iter()
-                    .for_each(|node| finder.watched.entry(node).or_default().push(i)),
+            let value = match hazard.watched {
+                Watched::Steps | Watched::Given(_) => None,
+                Watched::Value(node) => Some(node),
                 Watched::Transfer(from, to, then) => {
                     uses.by_transfer.entry((from, to)).or_default().push(i);
-                    then.filter(tells).into_iter().for_each(|node| finder.watched.entry(node).or_default().push(i));
+                    then
                 }
+            };
+            // A constant is the same node for all things that have it, so that its use does not say of which.
+            if let Some(node) = value.filter(|node| !matches!(lab.graph.op(*node), Op::Const(_))) {
+                finder.watched.entry(node).or_default().push(i);
             }
         }
         if finder.watched.is_empty() {
