@@ -146,7 +146,7 @@ impl Index {
 
     /// What was found of the value with which something is declared.
     fn seen_of(&self, def: &Def) -> Option<&Seen> {
-        if !matches!(def.kind, Kind::Variable | Kind::Constant | Kind::Setting | Kind::Parameter) {
+        if !matches!(def.kind, Kind::Variable | Kind::Constant | Kind::Table | Kind::Setting | Kind::Parameter) {
             return None;
         }
         // The value is the last thing of the declaration.
@@ -198,6 +198,7 @@ impl Index {
             Sort::Kind(_) => "a type".into(),
             Sort::Function(_) | Sort::Method => "a function".into(),
             Sort::Step => "a step".into(),
+            Sort::Row(_) => "a row of a table".into(),
             Sort::Nothing => "`nothing`".into(),
             Sort::Unlimited => "`unlimited`".into(),
         }

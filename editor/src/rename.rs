@@ -36,6 +36,9 @@ pub fn prepare(index: &Index, file: FileId, offset: usize) -> Result<(Span, DefI
     if d.kind == Kind::Setting && FIXED.contains(&d.name.as_str()) {
         return Err(format!("laws read the setting `{}` by this name", d.name));
     }
+    if d.kind == Kind::Column && index.is_header(def) {
+        return Err(format!("the header of the file names the column `{}`", d.name));
+    }
     if d.kind == Kind::Word {
         return Err(format!("`{}` is a word of a state: types are equal if their words are", d.name));
     }
@@ -143,6 +146,13 @@ impl Index {
         let files = (0..).map(FileId).map_while(|id| Some((id, self.sources().get(id)?)));
         let (_, source) = files.into_iter().find(|(_, s)| s.name == place.file)?;
         source.text.get(place.start as usize..place.end as usize)
+    }
+
+    /// Whether the name of a column is what the header of its file says: no other header stands behind it.
+    fn is_header(&self, column: DefId) -> bool {
+        let d = self.def(column);
+        let behind = self.text(d.whole).strip_prefix(d.name.as_str()).unwrap_or_default();
+        !behind.trim_start().starts_with('"')
     }
 
     /// Another declaration of the same member in what the owner extends, or in what extends it.

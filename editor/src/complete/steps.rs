@@ -334,7 +334,7 @@ impl Place<'_> {
             Some(Sort::Reaction) => self.globals(&[Kind::Reaction], 10, out),
             Some(Sort::Thing(..) | Sort::Frame | Sort::List(_)) => {}
             _ => {
-                self.globals(&[Kind::Constant, Kind::Function, Kind::Relation], 25, out);
+                self.globals(&[Kind::Constant, Kind::Table, Kind::Function, Kind::Relation], 25, out);
                 FOLDS.iter().for_each(|w| self.keyword(w, &format!("{w}(${{1:x}} in ${{2:set}}: $0)"), 35, out));
             }
         }

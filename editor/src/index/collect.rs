@@ -117,6 +117,11 @@ impl Index {
                     }
                 }
             }
+            ItemKind::Table { columns, .. } => {
+                for column in columns {
+                    self.add_inside(id, Kind::Column, &column.name, column.span);
+                }
+            }
             ItemKind::Hazard { params, .. }
             | ItemKind::Relation { params, .. }
             | ItemKind::Fn { params, .. }
@@ -264,7 +269,8 @@ fn kind_of(kind: &ItemKind) -> Option<Kind> {
         ItemKind::Event(_) => Kind::Event,
         ItemKind::Relation { .. } => Kind::Relation,
         ItemKind::Fn { .. } => Kind::Function,
-        ItemKind::Const { .. } | ItemKind::Table { .. } => Kind::Constant,
+        ItemKind::Const { .. } => Kind::Constant,
+        ItemKind::Table { .. } => Kind::Table,
         ItemKind::Framing { .. } => Kind::Framing,
         ItemKind::Driver { .. } => Kind::Driver,
         ItemKind::Lab { .. } => Kind::Lab,

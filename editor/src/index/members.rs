@@ -64,6 +64,9 @@ const OF_GRID: &[(&str, &str)] = &[
 const OF_STEP: &[(&str, &str)] =
     &[("start", "its start time"), ("end", "its end time"), ("elapsed", "its duration so far")];
 
+/// What can be asked of a row of a table, besides its columns.
+const OF_ROW: &[(&str, &str)] = &[("line", "its line in the file")];
+
 /// What can be asked of a thing that counts species.
 const OF_MIXTURE: &[(&str, &str)] =
     &[("species", "all species that can get into it"), ("basis", "the quantity that a rate refers to: `m.basis`")];
@@ -99,6 +102,12 @@ impl Index {
             Sort::Thing(kinds, full) => self.of_thing(kinds, full.as_deref(), name, true),
             Sort::Lab(lab) => self.of_lab(lab, name),
             Sort::List(inner) => {
+                // A column of all rows goes before what any list has.
+                if let Sort::Row(table) = **inner
+                    && let Some(column) = self.column(table, name)
+                {
+                    return Some(Member { sort: Sort::List(Box::new(column.sort)), ..column });
+                }
                 let found = known(OF_LIST, name).or_else(|| known(OF_GRID, name))?;
                 let sort = match name {
                     "first" | "last" | "well" => (**inner).clone(),
@@ -138,9 +147,24 @@ impl Index {
                 let sort = self.duration();
                 known(OF_STEP, name).map(|found| Member { sort, ..found })
             }
+            Sort::Row(table) => self.column(*table, name).or_else(|| {
+                let sort = Sort::number();
+                known(OF_ROW, name).map(|found| Member { sort, ..found })
+            }),
             Sort::Kind(_) | Sort::Any => None,
             _ => None,
         }
+    }
+
+    /// The columns of a table.
+    fn columns(&self, table: DeclId) -> impl Iterator<Item = DefId> + '_ {
+        let inside = self.of_decl(table).map_or(&[][..], |d| &self.def(d).inside);
+        inside.iter().copied().filter(|d| self.def(*d).kind == Kind::Column)
+    }
+
+    /// The column of a table with this name.
+    fn column(&self, table: DeclId, name: &str) -> Option<Member> {
+        self.columns(table).find(|d| self.def(*d).name == name).map(|d| self.stated(d))
     }
 
     /// The dimension of time.
@@ -339,7 +363,14 @@ impl Index {
                 let inside = self.included(lab).into_iter().flat_map(|l| self.def(l).inside.clone());
                 inside.filter_map(|d| self.of_lab(lab, &self.def(d).name)).collect()
             }
-            Sort::List(_) => [OF_LIST, OF_GRID].into_iter().flat_map(listed).collect(),
+            Sort::List(inner) => {
+                let columns = match **inner {
+                    Sort::Row(table) => self.columns(table).filter_map(|d| self.member_of(base, &self.def(d).name)),
+                    _ => return [OF_LIST, OF_GRID].into_iter().flat_map(listed).collect(),
+                };
+                columns.chain(listed(OF_LIST)).collect()
+            }
+            Sort::Row(table) => self.columns(*table).map(|d| self.stated(d)).chain(listed(OF_ROW)).collect(),
             Sort::Species => {
                 let mut out: Vec<Member> = self.properties().map(|def| self.stated(def)).collect();
                 let known: Vec<Member> =

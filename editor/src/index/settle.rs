@@ -66,6 +66,18 @@ impl Index {
                 let sort = self.typed(at, ty.as_ref(), Some(value));
                 self.set(name.span, sort);
             }
+            ItemKind::Table { name, columns, .. } => {
+                if let Some(table) = self.declared_at(name.span).and_then(|id| self.decl_of(id)) {
+                    self.set(name.span, Sort::List(Box::new(Sort::Row(table))));
+                }
+                for column in columns {
+                    let sort = self.sort_of_type(at, &column.ty);
+                    self.set(column.name.span, sort);
+                    if let Some(id) = self.declared_at(column.name.span) {
+                        self.words_of(id, Some(&column.ty));
+                    }
+                }
+            }
             ItemKind::Skill { sig, clauses, .. } => self.settle_signature(at, sig, clauses),
             ItemKind::Capability { members, name, .. } => {
                 self.set_kind(name.span);

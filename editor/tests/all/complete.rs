@@ -2,7 +2,7 @@
 
 use matterix_editor::complete::{Completion, complete, signature};
 
-use crate::names::LAB;
+use crate::names::{LAB, PLAN};
 use crate::support::{Files, analysed, marked};
 
 /// The best labels at `$0` in a line of the workflow of the lab; the analysis is that of the text with the line.
@@ -119,6 +119,17 @@ fn members_stand_behind_a_dot() {
     has(&offers("expect crate is $0"), &["open", "closed"], &[]);
     has(&offers("expect look.$0"), &["start", "end", "elapsed"], &[]);
     has(&offers("note \"{crate.$0}\""), &["lid"], &[]);
+}
+
+#[test]
+fn rows_have_the_columns_of_their_table() {
+    let typed = |line: &str| {
+        let (text, places) = marked(&PLAN.replace("        expect", &format!("        {line}\n        expect")));
+        let (analysis, index) = crate::names::plan();
+        sorted(complete(&index, analysis.root, &text, places[0]).all)
+    };
+    has(&typed("expect row.$0"), &["amount", "wait_for", "kind", "line"], &["count"]);
+    has(&typed("expect plan.$0"), &["amount", "wait_for", "kind", "count", "first"], &["line"]);
 }
 
 #[test]

@@ -42,6 +42,59 @@ workflow cook(target: Temperature = warm) in bench {
 } finally { stop heating plate }
 "#;
 
+/// A plan from a table whose columns have headers of their own or not.
+pub const PLAN: &str = r#"mtx 1
+use std::glassware::Beaker250mL
+table plan from csv "plan.csv" {
+    amount: Mass
+    wait_for "Rest (s)": Duration as s = 5 s
+    kind: fine | coarse
+}
+lab bench {
+    ambient: 22 degC
+    beaker = Beaker250mL at (0, 0, 0) m holding 100 g of water
+}
+workflow go(limit: Mass in 1 g .. 3 g = 2 g) in bench {
+    for row in plan {
+        if row.amount < limit and row.kind == fine { wait row.wait_for }
+        expect plan.amount.count == 2 and row.line > 1 and beaker.volume > 90 mL
+    }
+}
+"#;
+
+/// The plan with its file.
+pub fn plan() -> (Analysis, Index) {
+    let mut files = Files::default();
+    files.texts.insert("plan.csv".into(), "amount,Rest (s),kind\n1 g,2,fine\n3 g,,coarse\n".into());
+    let (analysis, index) = analysed("plan.mtx", PLAN, &files);
+    let found: Vec<_> = analysis.findings.iter().map(|d| &d.headline).collect();
+    assert!(found.is_empty(), "{found:?}");
+    (analysis, index)
+}
+
+#[test]
+fn columns_are_found_where_rows_name_them() {
+    let (analysis, index) = plan();
+    let plain = Index::declared(&analysis);
+    for index in [&index, &plain] {
+        let line = |what: &str| {
+            let spans = index.definition(analysis.root, place(PLAN, what));
+            let at = spans.first().unwrap_or_else(|| panic!("`{what}` is declared")).start as usize;
+            PLAN[at..].lines().next().unwrap_or_default()
+        };
+        assert_eq!(line("row.|amount"), "amount: Mass");
+        assert_eq!(line("wait row.|wait_for"), r#"wait_for "Rest (s)": Duration as s = 5 s"#);
+        assert_eq!(line("row.|kind"), "kind: fine | coarse");
+        assert_eq!(line("== |fine"), "fine | coarse");
+        assert_eq!(line("plan.|amount"), "amount: Mass");
+        assert_eq!(line("go(|limit"), "limit: Mass in 1 g .. 3 g = 2 g) in bench {");
+        assert!(index.uses(analysis.root).iter().all(|u| u.meaning != matterix_editor::index::Meaning::Unknown));
+    }
+    let rename = |what: &str| matterix_editor::rename::rename(&[], &index, analysis.root, place(PLAN, what), "pause");
+    assert_eq!(rename("row.|amount").unwrap_err(), "the header of the file names the column `amount`");
+    assert_eq!(rename("row.|wait_for").expect("has a header of its own")["plan.mtx"].len(), 2);
+}
+
 /// The lab with a mark at the n-th occurrence of a text, `|` within it where the cursor stands.
 pub fn place(text: &str, what: &str) -> usize {
     let plain = what.replace('|', "");

@@ -10,7 +10,7 @@ use matterix_lang::{Loader, Session};
 /// Files by the names of their modules, then those of a folder.
 #[derive(Default)]
 pub struct Files {
-    /// Texts by module.
+    /// Texts by module; other files by name.
     pub texts: BTreeMap<String, String>,
     /// Where others lie.
     pub folder: Option<PathBuf>,
@@ -25,6 +25,9 @@ impl Loader for Files {
     }
 
     fn bytes(&self, _: FileId, path: &str) -> Result<Vec<u8>, String> {
+        if let Some(text) = self.texts.get(path) {
+            return Ok(text.clone().into_bytes());
+        }
         let folder = self.folder.as_ref().ok_or("no such file")?;
         std::fs::read(folder.join(path)).map_err(|e| e.to_string())
     }

@@ -51,6 +51,8 @@ pub enum Sort {
     Method,
     /// A named step of a workflow.
     Step,
+    /// A row of a table.
+    Row(DeclId),
     /// No thing.
     Nothing,
     /// No limit.
@@ -110,7 +112,7 @@ impl Sort {
     pub(super) fn declared(&mut self) -> Vec<&mut DeclId> {
         match self {
             Sort::Thing(kinds, _) => kinds.iter_mut().collect(),
-            Sort::Kind(id) | Sort::Function(id) => vec![id],
+            Sort::Kind(id) | Sort::Function(id) | Sort::Row(id) => vec![id],
             Sort::Range(inner) | Sort::List(inner) => inner.declared(),
             Sort::Tuple(all) => all.iter_mut().flat_map(Sort::declared).collect(),
             _ => Vec::new(),

@@ -124,11 +124,11 @@ pub fn symbol_kind(kind: Kind) -> SymbolKind {
         }
         Kind::Command => SymbolKind::METHOD,
         Kind::Process | Kind::Event | Kind::Hazard | Kind::Step | Kind::Job | Kind::Failure => SymbolKind::EVENT,
-        Kind::Constant | Kind::Dimension | Kind::Unit => SymbolKind::CONSTANT,
+        Kind::Constant | Kind::Table | Kind::Dimension | Kind::Unit => SymbolKind::CONSTANT,
         Kind::Species | Kind::Solution | Kind::Group | Kind::Material => SymbolKind::STRUCT,
         Kind::Reaction | Kind::Equilibrium | Kind::Interaction => SymbolKind::STRUCT,
         Kind::Thing | Kind::Variable | Kind::Parameter => SymbolKind::VARIABLE,
-        Kind::Member | Kind::Option | Kind::Setting | Kind::Report => SymbolKind::PROPERTY,
+        Kind::Member | Kind::Option | Kind::Setting | Kind::Report | Kind::Column => SymbolKind::PROPERTY,
         Kind::Frame | Kind::Part | Kind::Grid | Kind::Joint => SymbolKind::FIELD,
         Kind::Driver | Kind::Framing => SymbolKind::MODULE,
         Kind::Word => SymbolKind::ENUM_MEMBER,

@@ -2,7 +2,7 @@
 
 use matterix_ir::Span;
 use matterix_lang::ast::{Call, ExprKind, Name, NamedExpr};
-use matterix_lang::names::verb_text;
+use matterix_lang::names::{DeclId, verb_text};
 use matterix_lang::semantic_index::Sort;
 
 use super::super::collect::verb_span;
@@ -103,10 +103,7 @@ impl Walk<'_> {
                 continue;
             }
             let device = |this: &mut Self, command: DefId| -> Sort {
-                let takes = this.index.def(command).inside.iter().any(|p| {
-                    let p = this.index.def(*p);
-                    p.kind == Kind::Parameter && p.label.is_none()
-                });
+                let takes = this.front(command).next().is_some();
                 let by = call.labelled.iter().find(|(l, _)| l.text == "by").map(|b| &b.1);
                 let word = call.words.get(words);
                 match (takes, word, &call.object, by) {
@@ -123,7 +120,16 @@ impl Walk<'_> {
                         let device = device(self, *def);
                         if self.index.can(&device, *def) { 0 } else { 100 }
                     }
-                    _ => 0,
+                    _ => {
+                        let first = self.front(*def).next();
+                        let given = match (call.words.get(words), &call.object) {
+                            (Some(word), _) => self.quietly(|w| w.name(word, &[]).sort),
+                            (None, Some(object)) => self.quietly(|w| w.expr(object).sort),
+                            (None, None) => Sort::Any,
+                        };
+                        let fits = first.is_none_or(|p| self.index.may_be(&given, &self.index.def(p).sort));
+                        if fits { 0 } else { 100 }
+                    }
                 };
                 let misfit = lacking + self.misfit(*def, call);
                 if best.is_none_or(|(least, _)| misfit < least) {
@@ -135,14 +141,20 @@ impl Walk<'_> {
         None
     }
 
+    /// The parameters of a skill or command that stand behind its verb, before any preposition.
+    fn front(&self, def: DefId) -> impl Iterator<Item = DefId> + '_ {
+        let inside = self.index.def(def).inside.iter().copied();
+        inside.filter(|p| {
+            let p = self.index.def(*p);
+            p.kind == Kind::Parameter && p.label.is_none()
+        })
+    }
+
     /// How badly a call's prepositions fit.
     fn misfit(&self, def: DefId, call: &Call) -> usize {
         let labels: Vec<&str> =
             self.index.def(def).inside.iter().filter_map(|p| self.index.def(*p).label.as_deref()).collect();
-        let takes = self.index.def(def).inside.iter().any(|p| {
-            let p = self.index.def(*p);
-            p.kind == Kind::Parameter && p.label.is_none()
-        });
+        let takes = self.front(def).next().is_some();
         let object = call.object.is_some() || call.words.len() > self.index.def(def).name.split(' ').count();
         // `by` names the device of a command whose object is something else.
         let command = self.index.def(def).kind == Kind::Command && (takes || !object);
@@ -205,6 +217,13 @@ impl Index {
         let skill = self.lookup(at, verb).filter(|d| self.def(*d).kind == Kind::Skill);
         let commands = self.verbs(verb).filter(|d| self.def(*d).kind == Kind::Command);
         skill.into_iter().chain(commands).collect()
+    }
+
+    /// Whether a value can be what a parameter takes, as far as both are known to be things.
+    pub(crate) fn may_be(&self, given: &Sort, taken: &Sort) -> bool {
+        let (Sort::Thing(kinds, _), Sort::Thing(wanted, _)) = (given, taken) else { return true };
+        let has = |kind: &DeclId| kinds.iter().any(|k| k == kind || self.ancestors(*k).contains(kind));
+        kinds.is_empty() || wanted.is_empty() || wanted.iter().all(has)
     }
 
     /// Whether a thing has the capability of a command.

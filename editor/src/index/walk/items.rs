@@ -131,10 +131,14 @@ impl Walk<'_> {
                 self.exprs(body);
                 self.member_options(options);
             }
-            ItemKind::Table { columns, .. } => {
+            ItemKind::Table { source, columns, .. } => {
+                self.language(source.0.span, "a format of files that tables come from");
                 for column in columns {
+                    let def = self.declares(column.name.span);
                     self.ty(&column.ty);
-                    self.exprs(&column.default);
+                    column.unit.iter().for_each(|unit| self.unit(unit));
+                    let words = def.map(|d| self.index.def(d).words.clone()).unwrap_or_default();
+                    column.default.iter().for_each(|e| drop(self.expr_among(e, &words)));
                 }
             }
             ItemKind::Const { ty, value, .. } => {

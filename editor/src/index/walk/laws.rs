@@ -1,6 +1,8 @@
 //! Laws, effects and clauses.
 
-use matterix_lang::ast::{Clause, ClauseKind, Effect, Expr, Goal, Law, LawKind, Manner, Name, Refusal, Sig, Text};
+use matterix_lang::ast::{
+    Clause, ClauseKind, Effect, Expr, Goal, Law, LawKind, Manner, Name, Param, Refusal, Sig, Text,
+};
 
 use super::{Found, Walk};
 use crate::index::Kind;
@@ -126,8 +128,8 @@ impl Walk<'_> {
         for p in &options {
             self.param(p);
         }
-        let names: Vec<&Name> = sig.all_params().chain(options.iter().copied()).map(|p| &p.name).collect();
-        self.enter_params(names.into_iter());
+        let params: Vec<&Param> = sig.all_params().chain(options.iter().copied()).collect();
+        self.enter_params(params.into_iter());
     }
 
     pub(super) fn clauses(&mut self, clauses: &[Clause]) {

@@ -13,7 +13,7 @@ mod things;
 mod types;
 
 use matterix_ir::{FileId, Span};
-use matterix_lang::ast::Name;
+use matterix_lang::ast::{Name, Param};
 use matterix_lang::names::Module;
 use matterix_lang::semantic_index::Sort;
 
@@ -132,14 +132,15 @@ impl Walk<'_> {
         }
     }
 
-    /// The parameters of an item, as local names.
-    fn enter_params<'p>(&mut self, names: impl Iterator<Item = &'p Name>) {
-        for name in names {
+    /// The parameters of an item, as local names; the conditions of their types may name them.
+    fn enter_params<'p>(&mut self, params: impl Iterator<Item = &'p Param> + Clone) {
+        for name in params.clone().map(|p| &p.name) {
             if let Some(id) = self.declares(name.span) {
                 let from = name.span.start;
                 self.enter(&name.text, id, from);
             }
         }
+        self.exprs(params.filter_map(|p| p.ty.as_ref()?.condition.as_ref()));
     }
 
     /// What a text sees beside the names of its module.

@@ -10,6 +10,7 @@ use crate::index::{DefId, Kind, Meaning};
 const BUILT_IN: &[(&str, &str)] = &[
     ("Bool", "a truth value"),
     ("Text", "a text"),
+    ("Place", "a place of a grid: `A1`"),
     ("Int", "a whole number"),
     ("Species", "a species"),
     ("Reaction", "a reaction"),
@@ -41,9 +42,6 @@ impl Walk<'_> {
         if let Some(inner) = &ty.argument {
             self.ty(inner);
         }
-        if let Some(condition) = &ty.condition {
-            self.expr(condition);
-        }
     }
 
     /// A name that may have its module before it.
@@ -61,12 +59,12 @@ impl Walk<'_> {
         self.index.lookup(self.at, &path.segments.last()?.text)
     }
 
-    /// The types and defaults of parameters, then their names.
+    /// The types and defaults of parameters, then their names and what holds for them.
     pub(super) fn params(&mut self, params: &[Param]) {
         for p in params {
             self.param(p);
         }
-        self.enter_params(params.iter().map(|p| &p.name));
+        self.enter_params(params.iter());
     }
 
     pub(super) fn param(&mut self, p: &Param) {
