@@ -98,6 +98,8 @@ enum Bound {
     Opposed(bool),
     /// Whether an interaction of the file is between two species.
     Interacts,
+    /// Whether a species attacks the wall around a mixture.
+    AttacksWall,
     /// The temperature at equilibrium.
     Settled,
     /// A value by what was put into mixtures, whatever equilibria make of it.
@@ -143,6 +145,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("opposed", Bound::Opposed(true)),
     ("alongside", Bound::Opposed(false)),
     ("interacts", Bound::Interacts),
+    ("attacks_wall", Bound::AttacksWall),
     ("settled_temperature", Bound::Settled),
     (AS_PUT, Bound::AsPut),
     ("heat_of_settling", Bound::HeatOfSettling),
@@ -366,6 +369,10 @@ impl Elaborator<'_> {
                 };
                 let acts = self.tables.interactions.iter().any(is_between);
                 self.certain(acts)
+            }
+            (Bound::AttacksWall, [Value::Instance(m), Value::Species(s)]) => {
+                let attacks = self.attacks_wall(*m, *s);
+                self.certain(attacks)
             }
             (Bound::Settled, [Value::Instance(m), Value::Num(otherwise)]) => {
                 let node = self.settled(*m, |_| Some(Part::Temperature)).unwrap_or(otherwise.node);

@@ -31,12 +31,9 @@ use matterix_ir::{Diagnostic, FileId, NodeId, Severity, Sources, Span};
 
 use super::Subject;
 use super::time::Times;
-use crate::ast::{MemberKind, Role};
 use crate::declare::SpeciesId;
-use crate::declare::Type;
 use crate::declare::compatibility::Consequence;
 use crate::elaborate::hazards::Hazard;
-use crate::eval::Value;
 use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
 use doses::Dose;
@@ -179,28 +176,14 @@ fn moves_of_events(eyes: &NodeEvaluator<'_, '_>, plan: &Plan) -> BTreeSet<(Insta
     eyes.lab.moves.iter().filter(|m| !by_process.contains(m) && !by_plan.contains(m)).copied().collect()
 }
 
-/// What the walls around mixtures are made of: the first parameter that is a material of what holds them.
+/// What the walls around mixtures are made of.
 fn materials(lab: &mut Elaborator<'_>) -> BTreeMap<InstanceId, DeclId> {
     let mut out = BTreeMap::new();
     for m in (0..lab.instances.len() as u32).map(InstanceId).filter(|m| lab.is_mixture(*m)).collect::<Vec<_>>() {
-        let holders: Vec<InstanceId> = std::iter::successors(Some(m), |i| lab.instances[i.0 as usize].owner).collect();
-        let found = holders.into_iter().find_map(|i| material_of(lab, i));
-        out.extend(found.map(|material| (m, material)));
+        let material = lab.wall_of(m);
+        out.extend(material.map(|material| (m, material)));
     }
     out
-}
-
-fn material_of(lab: &mut Elaborator<'_>, id: InstanceId) -> Option<DeclId> {
-    for member in lab.all_members(id).iter().copied() {
-        let MemberKind::Value { role: Role::Param, ty, name, .. } = &member.member.kind else { continue };
-        if !matches!(lab.resolve_type(ty, member.module), Type::Material { .. }) {
-            continue;
-        }
-        if let Value::Material(material) = lab.member_value(id, member, name.span) {
-            return Some(material);
-        }
-    }
-    None
 }
 
 /// What the vessels may hold where failures are raised: of a wait that is timed out, and of any step.

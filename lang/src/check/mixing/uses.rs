@@ -55,8 +55,11 @@ impl Uses {
             return uses;
         }
         finder.look_up();
+        let results = results(plan, library);
         for (i, step) in plan.steps.iter().enumerate() {
-            let found = finder.all(used_by(step, library));
+            let mut used = used_by(step, library);
+            used.extend(result(step, &results));
+            let found = finder.all(used);
             if !found.is_empty() {
                 uses.by_step.insert(StepId(i as u32), found);
             }
@@ -73,6 +76,22 @@ impl Uses {
             }
         }
         uses
+    }
+}
+
+/// The kept values that are results of steps which the user has named, `let shown <- read meter`.
+fn results(plan: &Plan, library: &BTreeSet<FileId>) -> BTreeSet<u32> {
+    let own = plan.steps.iter().filter(|step| !library.contains(&step.span.file) && step.label.starts_with("let "));
+    let named: FxHashSet<&str> = own.map(|step| step.label.as_str()).collect();
+    // A result is kept under the whole text of its statement.
+    (0..).zip(&plan.locals).filter(|(_, local)| named.contains(local.name.as_str())).map(|(i, _)| i).collect()
+}
+
+/// What a step gives as a result, which is used wherever the step stands.
+fn result(step: &PlanStep, results: &BTreeSet<u32>) -> Option<NodeId> {
+    match step.step {
+        Step::Let { local, value } if results.contains(&local) => Some(value),
+        _ => None,
     }
 }
 

@@ -26,7 +26,8 @@ pub mod states;
 pub mod substances;
 pub mod targets;
 pub mod verbs;
-pub mod within;
+pub mod walls;
+mod within;
 pub mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
