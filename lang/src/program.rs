@@ -1,5 +1,6 @@
 //! The whole front end: from a file to a program.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use matterix_ir::inventory::Inventory;
@@ -8,7 +9,7 @@ use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
-use matterix_ir::{Diagnostic, FileId, Leaves, Op, Program, Severity, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Leaves, NodeId, Op, Program, Severity, Sources, Span, Unit, codes};
 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::calibration::{self, Calibration};
@@ -20,6 +21,7 @@ use crate::elaborate::hazards::dangers;
 use crate::escapes::unhandled;
 use crate::eval::lab::choices::Choice;
 use crate::eval::lab::geometry::Geometry;
+use crate::eval::lab::given::VALID;
 use crate::eval::lab::reach::Reach;
 use crate::eval::lab::{Elaborator, ExtensiveKey};
 use crate::eval::{Num, Value};
@@ -711,7 +713,7 @@ fn build<'a>(
     checks::model(&mut elaborator);
     elaborator.judge_conservation(&events, &plan);
     let questions = (wanted == Wanted::Contents)
-        .then(|| Questions::of(&mut elaborator, observables.iter().filter(|o| o.1.is_none()).map(|o| (o.0, &o.2))));
+        .then(|| Questions::of(&mut elaborator, properties(&observables)));
     let asked = questions.as_ref().map(|q| q.nodes.as_slice());
     let checks::Judged { windows, seen, hazards } =
         checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
@@ -828,6 +830,13 @@ fn species(s: &crate::declare::species::SpeciesDef<'_>) -> matterix_ir::model::S
     }
 }
 
+/// The observables that are no amounts of species, each with its instance and the condition under which its model holds.
+fn properties(all: &[Observed]) -> impl Iterator<Item = (InstanceId, &Observable, Option<NodeId>)> {
+    let conditions: BTreeSet<u32> = all.iter().filter_map(|o| o.2.valid).collect();
+    let own = (0..).zip(all).filter(move |(i, o)| o.1.is_none() && !conditions.contains(i));
+    own.map(|(_, (id, _, o))| (*id, o, o.valid.and_then(|i| all.get(i as usize)?.2.value.first().copied())))
+}
+
 /// What an observable is about: an instance and, for a concentration, the species.
 type Observed = (InstanceId, Option<crate::declare::SpeciesId>, Observable);
 
@@ -860,7 +869,12 @@ fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
             }
             let unit = lab.declared_unit(options, &ty).unwrap_or_else(|| lab.type_unit(&ty));
             let name = format!("{}.{}", lab.instances[i as usize].name, name.text);
-            out.push((id, None, Observable { name, value, unit }));
+            let valid = lab.validity(id, m, options).map(|node| {
+                let name = format!("{name}.{VALID}");
+                out.push((id, None, Observable { name, value: vec![node], unit: Unit::one(), valid: None }));
+                out.len() as u32 - 1
+            });
+            out.push((id, None, Observable { name, value, unit, valid }));
         }
         for s in lab.mixture_species(id) {
             out.extend(concentration(lab, id, s).map(|o| (id, Some(s), o)));
@@ -877,7 +891,7 @@ fn settled(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::declare::SpeciesI
     let State { name, domain: Domain::Quantity(unit), .. } = &mut lab.states[state as usize] else { return None };
     let (shown, unit) = (name.clone(), unit.clone());
     name.push_str(".put");
-    Some(Observable { name: shown, value: vec![node], unit })
+    Some(Observable { name: shown, value: vec![node], unit, valid: None })
 }
 
 /// The library's first concentration of a species: per mass of mixture, or a mass fraction where counted by mass.
@@ -895,7 +909,7 @@ fn concentration(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::declare::Sp
             Num { node: lab.graph.number(1.0), dimension: dimension.clone(), point: false, unit: None, literal: false };
         let Value::Num(n) = lab.concentration(id, s, &probe, value.span)? else { return None };
         let name = format!("{}[{}]", lab.instances[id.0 as usize].name, lab.tables.species.get(s).name);
-        return Some(Observable { name, value: vec![n.node], unit: lab.type_unit(&ty) });
+        return Some(Observable { name, value: vec![n.node], unit: lab.type_unit(&ty), valid: None });
     }
     None
 }
@@ -935,7 +949,8 @@ fn mixture(
     extensive.sort();
     contents.sort_by_key(|c: &Content| c.species);
     let species = |i: u32| observables[i as usize].1.map(|s| s.0);
-    let properties = of.iter().copied().filter(|i| species(*i).is_none()).collect();
+    let conditions: BTreeSet<u32> = of.iter().filter_map(|i| observables[*i as usize].2.valid).collect();
+    let properties = of.iter().copied().filter(|i| species(*i).is_none() && !conditions.contains(i)).collect();
     let is_settled = |i: &u32| {
         let Observable { value, .. } = &observables[*i as usize].2;
         value.first().is_some_and(|node| matches!(lab.graph.op(*node), Op::Solved(..)))

@@ -319,6 +319,9 @@ pub struct Observable {
     pub value: Vec<NodeId>,
     /// As shown.
     pub unit: Unit,
+    /// Index into [`Model::observables`] of the condition under which its model holds: 1 where it does, 0 elsewhere. Absent where it always does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub valid: Option<u32>,
 }
 
 /// What a process does to a sum that it should not change, where its form does not show that this is nothing.

@@ -101,6 +101,9 @@ pub struct Fact {
     pub value: Value,
     /// Whether the statement changes it.
     pub changed: bool,
+    /// Whether it may be outside the range of its model: the value is then not to be relied on.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub outside: bool,
 }
 
 /// A reagent that a mixture has touched since it was last clean.

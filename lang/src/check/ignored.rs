@@ -12,7 +12,7 @@ use crate::elaborate::held_back::OF_EACH;
 use crate::elaborate::lab::SYMMETRIC;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::free::Bound;
-use crate::eval::lab::given::{GIVEN_BY, HIDDEN, INSTEAD, ONLY_WITH};
+use crate::eval::lab::given::{GIVEN_BY, HIDDEN, INSTEAD, ONLY_WITH, VALID};
 use crate::eval::lab::properties::{GIVES, GIVES_AT};
 use crate::inventory::{COUNTS_AS, count_of};
 use crate::near;
@@ -22,7 +22,7 @@ pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
         Role::State => ("a state", &["unit", "scale", COUNTS_AS, BARS]),
         Role::Extensive => ("an extensive quantity", &["unit", "scale", HIDDEN, ONLY_WITH, MATTER, OUTSIDE, OF_EACH]),
-        Role::Derived => ("a derived quantity", &["unit", HIDDEN, INSTEAD, COUNTS_AS]),
+        Role::Derived => ("a derived quantity", &["unit", HIDDEN, VALID, INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
         Role::Param => ("a parameter", &["above", "at_least", "at_most", GIVEN_BY, GIVES, GIVES_AT]),
         Role::Flow => ("a flow", &[]),

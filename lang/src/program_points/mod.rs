@@ -27,6 +27,8 @@ struct Asked {
     name: String,
     domain: Domain,
     node: NodeId,
+    /// Where its model holds; absent where it always does.
+    valid: Option<NodeId>,
 }
 
 /// What is asked of an instance.
@@ -48,10 +50,10 @@ pub struct Questions {
 
 impl Questions {
     /// The states of every instance that its declaration does not hide, what follows from them (`observables`, each with
-    /// its instance), amounts of species, and reagents.
+    /// its instance and where its model holds), amounts of species, and reagents.
     pub fn of<'o>(
         lab: &mut Elaborator<'_>,
-        observables: impl Iterator<Item = (InstanceId, &'o Observable)>,
+        observables: impl Iterator<Item = (InstanceId, &'o Observable, Option<NodeId>)>,
     ) -> Questions {
         let mut things: Vec<About> = (0..lab.instances.len() as u32)
             .map(|i| About {
@@ -62,12 +64,12 @@ impl Questions {
                 reagents: Vec::new(),
             })
             .collect();
-        for (instance, o) in observables {
+        for (instance, o, valid) in observables {
             // A colour is three numbers of which none is read by itself.
             if let [node] = o.value.as_slice() {
                 let name = o.name.rsplit('.').next().unwrap_or(&o.name).to_string();
                 let domain = Domain::Quantity(o.unit.clone());
-                things[instance.0 as usize].facts.push(Asked { name, domain, node: *node });
+                things[instance.0 as usize].facts.push(Asked { name, domain, node: *node, valid });
             }
         }
         for thing in &mut things {
@@ -95,7 +97,7 @@ impl Questions {
             }
             if let Some(node) = lab.settled_amount(key.instance, species) {
                 let solid = lab.is_solid(species);
-                let amount = Asked { name: asked.name.clone(), domain: asked.domain.clone(), node };
+                let amount = Asked { name: asked.name.clone(), domain: asked.domain.clone(), node, valid: None };
                 things[key.instance.0 as usize].settled.push((amount, solid));
             }
             things[key.instance.0 as usize].species.push(asked);
@@ -149,13 +151,16 @@ impl Questions {
         let mut out = Vec::new();
         for about in &self.things {
             let mut facts = |asked: &mut dyn Iterator<Item = &Asked>| -> Vec<Fact> {
-                let known = asked.zip(values.by_ref());
-                let fact = |(a, (known, changed)): (&Asked, &(AbstractValue, bool))| Fact {
-                    name: a.name.clone(),
-                    value: words.value(known, &a.domain),
-                    changed: *changed,
+                let fact = |a: &Asked| {
+                    let (known, changed) = values.next()?;
+                    let holds = match a.valid {
+                        Some(_) => values.next()?.0.truth(),
+                        None => Some(true),
+                    };
+                    let value = words.value(known, &a.domain);
+                    Some(Fact { name: a.name.clone(), value, changed: *changed, outside: holds != Some(true) })
                 };
-                known.map(fact).collect()
+                asked.map_while(fact).collect()
             };
             let (facts, species, settled) = (
                 facts(&mut about.facts.iter()),
@@ -183,7 +188,7 @@ impl Questions {
 impl About {
     fn nodes(&self) -> impl Iterator<Item = NodeId> {
         let facts = self.facts.iter().chain(&self.species).chain(self.settled.iter().map(|s| &s.0));
-        facts.map(|a| a.node).chain(self.reagents.iter().map(|r| r.1))
+        facts.flat_map(|a| std::iter::once(a.node).chain(a.valid)).chain(self.reagents.iter().map(|r| r.1))
     }
 }
 
@@ -246,7 +251,7 @@ fn visible_states(lab: &Elaborator<'_>, id: InstanceId) -> Vec<(String, u32)> {
 
 fn ask(lab: &mut Elaborator<'_>, name: String, state: u32) -> Asked {
     let domain = lab.states[state as usize].domain.clone();
-    Asked { name, domain, node: lab.graph.add(Op::State(state)) }
+    Asked { name, domain, node: lab.graph.add(Op::State(state)), valid: None }
 }
 
 /// The name that a statement binds to the result of a step.
@@ -280,7 +285,7 @@ impl Words<'_, '_> {
             // What a skill gives is its caller's to name.
             let named = !local.name.contains(' ') && sets(*i);
             if let Some(name) = result.or_else(|| named.then_some(local.name.as_str())) {
-                out.push(Fact { name: name.to_string(), value: quantity(known, local.unit.clone()), changed: true });
+                out.push(Fact { name: name.to_string(), value: quantity(known, local.unit.clone()), changed: true, outside: false });
             }
         }
         out

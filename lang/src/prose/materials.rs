@@ -54,12 +54,14 @@ impl Prose<'_, '_> {
         model.graph.eval(node, Env { time: 0.0, states, params: &params, locals: &[], readings: &[] })
     }
 
-    /// The pH of a mixture once its salts have dissolved, where equilibria give it one.
-    fn ph_at_first(&self, mixture: u32) -> Option<f64> {
+    /// The pH of a mixture once its salts have dissolved, where equilibria give it one, and whether its model holds there.
+    fn ph_at_first(&self, mixture: u32) -> Option<(f64, bool)> {
         let model = &self.program.model;
         let of = model.mixtures.get(mixture as usize)?;
         let shown = of.properties.iter().filter_map(|i| model.observables.get(*i as usize));
-        let node = *shown.into_iter().find(|o| o.name.ends_with(".ph"))?.value.first()?;
+        let shown = shown.into_iter().find(|o| o.name.ends_with(".ph"))?;
+        let node = *shown.value.first()?;
+        let valid = shown.valid.and_then(|i| model.observables.get(i as usize)?.value.first().copied());
         let mut states: Vec<f64> = model.states.iter().map(|s| self.at_first(s.initial)).collect();
         let species = &self.lab.tables.species;
         let place = |s: SpeciesId| of.contents.iter().find(|c| c.species == s.0).map(|c| c.state as usize);
@@ -75,7 +77,8 @@ impl Prose<'_, '_> {
                 states[place(*ion)?] += count * amount;
             }
         }
-        Some(self.with(&states, node)).filter(|ph| ph.is_finite())
+        let ph = Some(self.with(&states, node)).filter(|ph| ph.is_finite())?;
+        Some((ph, valid.is_none_or(|valid| self.with(&states, valid) == 1.0)))
     }
 
     fn instance(&self, id: InstanceId) -> &Instance {
@@ -230,7 +233,10 @@ impl Prose<'_, '_> {
             let Some((first, _)) = terms.clone().next() else { continue };
             let warm = first.start.as_ref().map(|(node, unit)| words::quantity(&unit.show(self.at_first(*node))));
             let warm = warm.map(|t| format!(" at {t}")).unwrap_or_default();
-            let ph = self.ph_at_first(mixture).map(|ph| format!(" Its pH is {ph:.2}.")).unwrap_or_default();
+            let ph = self.ph_at_first(mixture).map(|(ph, holds)| match holds {
+                true => format!(" Its pH is {ph:.2}."),
+                false => format!(" Its pH is near {ph:.2}, outside the range of its model."),
+            }).unwrap_or_default();
             let (vessel, what, place) = (
                 self.instance(self.holder(mixture)).name.clone(),
                 (format!("{}{warm}", joined(&texts, "and")), ph),

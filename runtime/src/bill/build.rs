@@ -287,21 +287,26 @@ impl Maker<'_, '_> {
         let model = &self.of.program.model;
         let mixture = &model.mixtures[i];
         let name = self.name(mixture.instance);
-        let property = |(index, value): &(u32, f64)| {
-            let observable = model.observables.get(*index as usize)?;
+        let own = |index: u32| {
+            let observable = model.observables.get(index as usize)?;
             let own = observable.name.strip_prefix(name).unwrap_or(&observable.name).trim_start_matches('.');
-            let (value, unit) = (observable.unit.of_si(*value), observable.unit.symbol.clone());
-            value.is_finite().then(|| (own.to_owned(), Quantity { value, unit }))
+            Some((own.to_owned(), &observable.unit))
+        };
+        let property = |(index, value): &(u32, f64)| {
+            let (own, unit) = own(*index)?;
+            let (value, unit) = (unit.of_si(*value), unit.symbol.clone());
+            value.is_finite().then_some((own, Quantity { value, unit }))
         };
         let solid = |(at, c): (usize, &Content)| {
             let species = model.species.get(c.species as usize)?;
             let amount = self.of.amount(i, at, c).filter(|n| *n > 0.0 && model.is_solid(c))?;
             Some(SolidLine { name: species.name.clone(), amount: amount * 1e3, mass: amount * species.molar_mass * G })
         };
-        let properties = self.of.settled.get(i).map_or(&[][..], |s| &s.properties);
+        let (properties, outside) = self.of.settled.get(i).map_or((&[][..], &[][..]), |s| (&s.properties, &s.outside));
         MixtureLine {
             vessel: self.name(self.of.holder(i)).to_owned(),
             properties: properties.iter().filter_map(property).collect(),
+            outside: outside.iter().filter_map(|i| Some(own(*i)?.0)).collect(),
             solids: mixture.contents.iter().enumerate().filter_map(solid).collect(),
         }
     }

@@ -18,6 +18,8 @@ pub(super) struct Settled {
     pub(super) amounts: Vec<Option<f64>>,
     /// By property of one number, SI.
     pub(super) properties: Vec<(u32, f64)>,
+    /// Those of them that are outside the range of their model.
+    pub(super) outside: Vec<u32>,
 }
 
 impl Settled {
@@ -27,9 +29,12 @@ impl Settled {
             _ => None,
         };
         let properties = mixture.properties.iter().filter_map(|i| Some((*i, value(*i)?)));
+        let valid = |i: &u32| engine.model().observables.get(*i as usize).and_then(|o| o.valid);
+        let outside = mixture.properties.iter().filter(|i| valid(i).and_then(value).is_some_and(|holds| holds != 1.0));
         Settled {
             amounts: mixture.contents.iter().map(|c| value(c.settled?)).collect(),
             properties: properties.collect(),
+            outside: outside.copied().collect(),
         }
     }
 }

@@ -169,7 +169,8 @@ fn mixtures(bill: &Bill) -> Option<String> {
     let mut table = Table::new(&[Left, Left]);
     for m in &bill.mixtures {
         let property = |(name, Quantity { value, unit }): &(String, Quantity)| {
-            format!("{name} {}{}{unit}", digits(*value), if unit.is_empty() { "" } else { " " })
+            let outside = if m.outside.contains(name) { " (outside its model)" } else { "" };
+            format!("{name} {}{}{unit}{outside}", digits(*value), if unit.is_empty() { "" } else { " " })
         };
         let solid = |s: &SolidLine| format!("{} {}, solid ({})", amount(s.amount / 1e3), s.name, mass(s.mass));
         let said: Vec<String> = m.properties.iter().map(property).chain(m.solids.iter().map(solid)).collect();

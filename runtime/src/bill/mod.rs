@@ -173,6 +173,9 @@ pub struct MixtureLine {
     pub vessel: String,
     /// Its properties by name, such as its volume and pH.
     pub properties: Vec<(String, Quantity)>,
+    /// Those of them, by name, that are outside the range of their model.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outside: Vec<String>,
     /// The solids in it.
     pub solids: Vec<SolidLine>,
 }

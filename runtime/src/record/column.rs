@@ -39,6 +39,8 @@ pub(super) struct Column<'a> {
     pub(super) shown: Shown<'a>,
     /// By component; SI.
     pub(super) parts: Vec<&'a Series>,
+    /// Whether it leaves the range of its model at some time.
+    pub(super) outside: bool,
 }
 
 impl<'a> Column<'a> {
@@ -51,14 +53,16 @@ impl<'a> Column<'a> {
             Domain::Instance => Shown::Instance,
             Domain::Enum(words) => Shown::Enum(words),
         };
-        Some(Column { name: &state.name, shown, parts: vec![run.recording.states.get(index)?] })
+        Some(Column { name: &state.name, shown, parts: vec![run.recording.states.get(index)?], outside: false })
     }
 
     /// The observable with this index.
     pub(super) fn observable(run: &Run<'a>, index: usize) -> Option<Column<'a>> {
         let observable = run.program.model.observables.get(index)?;
         let parts = run.recording.observables.get(index)?.iter().collect();
-        Some(Column { name: &observable.name, shown: Shown::Quantity(&observable.unit), parts })
+        let valid = observable.valid.and_then(|i| run.recording.observables.get(i as usize)?.first());
+        let outside = valid.is_some_and(|valid| valid.values().any(|holds| holds != 1.0));
+        Some(Column { name: &observable.name, shown: Shown::Quantity(&observable.unit), parts, outside })
     }
 
     /// How much of a species there is: at equilibrium where that settles it.

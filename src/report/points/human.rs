@@ -171,7 +171,7 @@ fn listed(mut amounts: Vec<&Fact>, most: usize) -> Vec<String> {
 
 /// Whether what is there at equilibrium is to be told: a solid that is there, or what is not as much as was put in.
 fn differs(thing: &Thing, settled: &Settled) -> bool {
-    let Fact { name, value: known, changed } = &settled.amount;
+    let Fact { name, value: known, changed, .. } = &settled.amount;
     let put = thing.species.iter().find(|s| s.name == *name);
     let is_same = !settled.solid && put.is_some_and(|put| value(&put.value) == value(known));
     !is_same && (*changed || !is_nothing(known))

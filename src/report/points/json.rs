@@ -65,7 +65,11 @@ fn settled(settled: &Settled) -> Json {
 }
 
 fn fact(fact: &Fact) -> Json {
-    json!({ "name": fact.name, "value": value(&fact.value), "changed": fact.changed })
+    let mut out = json!({ "name": fact.name, "value": value(&fact.value), "changed": fact.changed });
+    if fact.outside {
+        out["outside"] = true.into();
+    }
+    out
 }
 
 /// Numbers in the unit named beside them.

@@ -41,9 +41,18 @@ pub(super) fn value(value: &Value) -> String {
     }
 }
 
+/// What stands beside a number where the model that gave it does not hold.
+const OUTSIDE: &str = " (outside its model)";
+
+/// Whether anything is known of a value.
+fn is_known(value: &Value) -> bool {
+    !matches!(value, Value::Unknown | Value::Between(None, None, _))
+}
+
 /// A name and what is known of it.
 pub(super) fn fact(fact: &Fact) -> String {
-    format!("{} {}", fact.name, value(&fact.value))
+    let outside = if fact.outside && is_known(&fact.value) { OUTSIDE } else { "" };
+    format!("{} {}{outside}", fact.name, value(&fact.value))
 }
 
 /// Seconds as people read them.

@@ -21,6 +21,8 @@ pub const GIVEN_BY: &str = "given_by";
 pub const ONLY_WITH: &str = "only_with";
 /// The option of a member that keeps it out of what is shown: `true`, or of a derived one a condition that no run changes.
 pub const HIDDEN: &str = "hidden";
+/// The option of a derived member that says where its model holds.
+pub const VALID: &str = "valid";
 
 /// How far names in definitions are followed to what can be given.
 const DEEPEST: usize = 4;

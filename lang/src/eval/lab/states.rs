@@ -8,7 +8,7 @@ use matterix_ir::scene::{Carrier, InstanceId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
 
 use super::Mode;
-use super::given::HIDDEN;
+use super::given::{HIDDEN, VALID};
 use super::{Elaborator, ExtensiveKey, MemberKey};
 use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
 use crate::declare::SpeciesId;
@@ -161,6 +161,14 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "changes in a run"));
         }
         known.is_none_or(|truth| truth != 0.0)
+    }
+
+    /// Where the option `valid` says that the model of a derived member holds; absent where it always does.
+    pub fn validity(&mut self, id: InstanceId, m: MemberRef<'a>, options: &'a [NamedExpr]) -> Option<NodeId> {
+        let o = options.iter().find(|o| o.name.text == VALID)?;
+        let condition = self.expr(&o.value, &mut Scope::of_member(id, m));
+        let Value::Bool(node) = self.coerce(condition, &Type::Bool, o.value.span, VALID) else { return None };
+        (self.glance(node) != Some(1.0)).then_some(node)
     }
 
     /// `{ unit: "mmol" }`: how the member is shown.

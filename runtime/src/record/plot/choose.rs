@@ -122,7 +122,9 @@ fn by_unit(run: &Run<'_>) -> Vec<(Unit, Panel)> {
     let concentrations: BTreeSet<u32> = model.mixtures.iter().flat_map(|m| m.concentrations.iter().copied()).collect();
     let states = (0..model.states.len()).filter(|&i| !hidden.contains(&(i as u32)));
     let states = states.filter_map(|i| Some((Column::state(run, i)?, !flowing.contains(&(i as u32)))));
-    let others = (0..model.observables.len()).filter(|&i| !concentrations.contains(&(i as u32)) && !repeats(run, i));
+    let conditions: BTreeSet<u32> = model.observables.iter().filter_map(|o| o.valid).collect();
+    let is_left = |i: &usize| !concentrations.contains(&(*i as u32)) && !conditions.contains(&(*i as u32));
+    let others = (0..model.observables.len()).filter(|i| is_left(i) && !repeats(run, *i));
     let others = others.filter_map(|i| Some((Column::observable(run, i)?, false)));
 
     let mut groups: Vec<(Unit, Vec<(Column<'_>, bool)>)> = Vec::new();
@@ -152,6 +154,8 @@ fn unit_panel(unit: &Unit, columns: Vec<(Column<'_>, bool)>) -> Option<Panel> {
         }
     }
     let mut panel = panel(String::new(), &unit.symbol, lines)?;
+    let outside: BTreeSet<String> = columns.iter().filter(|(c, _)| c.outside).map(|(c, _)| c.part_name(0)).collect();
+    let outside: Vec<bool> = panel.series.iter().map(|line| outside.contains(&line.name)).collect();
     let mut kinds: Vec<String> = Vec::new();
     for line in &panel.series {
         let kind = kind(&line.name).to_owned();
@@ -166,6 +170,9 @@ fn unit_panel(unit: &Unit, columns: Vec<(Column<'_>, bool)>) -> Option<Panel> {
                 line.name = owner.to_owned();
             }
         }
+    }
+    for (line, _) in panel.series.iter_mut().zip(outside).filter(|(_, outside)| *outside) {
+        line.name += " (at times outside its model)";
     }
     kinds.truncate(4);
     panel.title = kinds.join(", ");

@@ -130,7 +130,8 @@ fn container(container: &ContainerReport) -> Option<String> {
     let show = |p: &super::PropertyReport| {
         let values: Vec<String> = p.values.iter().map(|&v| digits(v)).collect();
         let values = if values.len() == 1 { values.concat() } else { format!("({})", values.join(", ")) };
-        format!("{} {values}{}{}", p.name, if p.unit.is_empty() { "" } else { " " }, p.unit)
+        let outside = if p.outside { " (outside its model)" } else { "" };
+        format!("{} {values}{}{}{outside}", p.name, if p.unit.is_empty() { "" } else { " " }, p.unit)
     };
     let known = |p: &&super::PropertyReport| p.values.iter().all(|v| v.is_finite());
     let properties: Vec<String> = container.properties.iter().filter(known).map(show).collect();

@@ -210,6 +210,9 @@ pub struct PropertyReport {
     pub values: Vec<f64>,
     /// Of the values.
     pub unit: String,
+    /// Whether the range of its model does not contain them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub outside: bool,
 }
 
 /// One execution of a node of the plan.

@@ -145,7 +145,7 @@ fn model() -> Model {
         span: line(2),
     }];
     model.species = vec![species("EtOH", "C2H6O", 0.046_069), species("EtI", "C2H5I", 0.155_966)];
-    let observable = |name: &str, value: Vec<_>, unit| Observable { name: name.into(), value, unit };
+    let observable = |name: &str, value: Vec<_>, unit| Observable { name: name.into(), value, unit, valid: None };
     model.observables = vec![
         observable("beaker.contents.temperature", vec![temperature], degc()),
         observable("beaker.contents.color", vec![zero, zero, zero], Unit::one()),
