@@ -184,3 +184,136 @@ fn pairs_of_ions_and_other_laws_are_told_where_solids_are() {
         assert_eq!(said.contains("hold with `activities: pitzer` only"), told, "{law}: {said}");
     }
 }
+
+#[test]
+fn a_buffer_is_spent_only_where_no_other_pair_buffers() {
+    let lye = "use std::equilibria\nuse std::acids\n";
+    let said = |name: &str, into: &str| poured(name, lye, "50 g of water + 24 mmol of NaOH", into, "");
+    // 12 mmol of NaOH: the three steps of citric acid buffer one after the other; phosphoric acid alone is no buffer yet.
+    for (name, into) in [
+        ("citrate_made", "100 g of water + 10 mmol of citric_acid"),
+        ("citrate_moved", "100 g of water + 10 mmol of citric_acid + 10 mmol of dihydrogen_citrate + 10 mmol of Na+"),
+        ("phosphate_made", "100 g of water + 8 mmol of H3PO4"),
+    ] {
+        let said = said(name, into);
+        assert!(!said.contains("exhausts"), "{said}");
+    }
+    for (name, into, acid) in [
+        ("acetate_spent", "100 g of water + 8 mmol of acetic_acid + 8 mmol of acetate + 8 mmol of Na+", "acetic_acid"),
+        ("phosphate_spent", "100 g of water + 8 mmol of H2PO4- + 8 mmol of HPO4^2- + 24 mmol of Na+", "H2PO4-"),
+    ] {
+        let said = said(name, into);
+        assert!(said.contains(&format!("exhausts the buffer of {acid}")), "{said}");
+    }
+}
+
+#[test]
+fn what_equilibria_make_attacks_a_wall_as_well() {
+    let fluoride = "50 g of water + 10 mmol of F- + 10 mmol of Na+";
+    let of = |name: &str, from: &str| poured(name, EQUILIBRIA, from, fluoride, "");
+    let acid = of("etched", "50 g of water + 10 mmol of HCl");
+    assert!(acid.contains("`cup` comes to hold 3.990") && acid.contains("mmol of HF, which attacks its wall"), "{acid}");
+    let salt = of("not_etched", "50 g of water + 10 mmol of NaCl");
+    assert!(!salt.contains("attack"), "{salt}");
+    // What is put in as such is one finding, not two.
+    let put = of("put_in", "50 g of water + 10 mmol of HF");
+    assert!(put.contains("material-attacked") && !put.contains("comes to hold"), "{put}");
+    let allowed = "use std::equilibria\nallow incompatible borosilicate with HF \"a cup to throw away\"\n";
+    let allowed = poured("allowed", allowed, "50 g of water + 10 mmol of HCl", fluoride, "");
+    assert!(!allowed.contains("attack"), "{allowed}");
+}
+
+#[test]
+fn a_named_result_of_a_library_step_is_a_use() {
+    let lines = "    c = Beaker250mL at (2, 0, 0) m holding 100 g of water + 300 mmol of Na+ + 300 mmol of Cl-
+    meter = GlassElectrode { probes: c } at (2, 1, 0) m
+    brine = Beaker250mL at (3, 0, 0) m holding 100 g of water + 100 mmol of Ca2+ + 200 mmol of Cl-
+    probe = CalciumMembrane { probes: brine } at (3, 1, 0) m
+";
+    let dir = folder("named_result");
+    let text = |steps: &str| {
+        format!(
+            "mtx 1\nuse std::equilibria\nuse std::electrodes\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n{lines}}}\nworkflow go in bench {{\n{steps}}}\n"
+        )
+    };
+    write(&dir, "read.mtx", text("    let shown <- read meter\n    let ion <- read probe\n    note \"{shown} {ion}\"\n"));
+    let said = flat(&matterixc_in(&dir, &["check", "read.mtx", "--no-cache"]).out);
+    assert!(said.contains("`meter` is not calibrated"), "{said}");
+    assert!(said.contains("of `c` is used at an ionic strength of 3.00"), "{said}");
+    assert!(said.contains("the activity of an ion in `brine` is used at an ionic strength of 3.00"), "{said}");
+    // Nobody uses a reading that has no name.
+    write(&dir, "idle.mtx", text("    expect c.volume > 1 mL and brine.volume > 1 mL\n"));
+    let said = flat(&matterixc_in(&dir, &["check", "idle.mtx", "--no-cache"]).out);
+    assert!(!said.contains("ionic strength"), "{said}");
+}
+
+#[test]
+fn a_ph_outside_its_model_is_shown_as_such() {
+    let dir = folder("outside_model");
+    let text = "mtx 1
+use std::equilibria
+use std::glassware::Beaker250mL
+use std::titration::MotorBurette
+lab bench {
+    ambient: 25 degC
+    strong = Beaker250mL at (0, 0, 0) m holding 10 g of water + 10 mmol of HCl
+    brine = Beaker250mL at (1, 0, 0) m holding 100 g of water + 10 g of NaCl
+    weak = Beaker250mL at (2, 0, 0) m holding 100 g of water + 1 mmol of HCl
+    burette = MotorBurette { over: strong } at (0, 300, 0) mm holding 19 g of water
+}
+workflow go in bench {
+    deliver 13 mL by burette
+    expect brine.volume > 1 mL and weak.volume > 1 mL
+}
+";
+    write(&dir, "cup.mtx", text);
+    let checked = flat(&matterixc_in(&dir, &["check", "--contents", "cup.mtx", "--no-cache"]).out);
+    assert!(checked.contains("ph 0.102 (outside its model)") && checked.contains("ph 0.49"), "{checked}");
+    assert!(!checked.contains("ph 2.0446 (outside"), "{checked}");
+    let run = matterixc_in(&dir, &["run", "cup.mtx", "--out", "out"]).out;
+    let of = |vessel: &str| {
+        let mut lines = run.lines().filter(|line| line.trim_start().starts_with(&format!("{vessel}.contents: mass")));
+        lines.next().unwrap_or_else(|| panic!("{vessel} in {run}")).to_owned()
+    };
+    assert!(of("brine").contains("(outside its model)"), "{run}");
+    assert!(!of("strong").contains("outside") && !of("weak").contains("outside"), "{run}");
+    let plot = std::fs::read_to_string(dir.join("out/plot.svg")).expect("a plot");
+    assert!(plot.contains("ph; at times outside the model: strong.contents"), "the curve of `strong` begins outside");
+    let bill = matterixc_in(&dir, &["bill", "cup.mtx"]).out;
+    assert_eq!(bill.matches("(outside its model)").count(), 1, "{bill}");
+    let doc = matterixc_in(&dir, &["doc", "cup.mtx"]).out;
+    assert!(doc.contains("Its pH is near 0.10, outside the range of its model."), "{doc}");
+}
+
+#[test]
+fn validity_is_a_condition_of_ones_own_quantities_too() {
+    let dir = folder("own_validity");
+    let text = |condition: &str| {
+        format!(
+            "mtx 1
+use std::glassware::Beaker250mL
+asset Watched: Beaker250mL {{}}
+capability Vapour: Vessel {{
+    derived pressure: Pressure = 1 kPa * (contents.temperature - 273.15 K) / (10 K) {{ valid: {condition} }}
+}}
+asset Steaming: Beaker250mL, Vapour {{}}
+lab bench {{
+    ambient: 25 degC
+    cold = Steaming at (0, 0, 0) m holding 100 g of water at 20 degC
+    warm = Steaming at (1, 0, 0) m holding 100 g of water at 60 degC
+}}
+workflow go in bench {{
+    wait 1 s
+    expect cold.pressure > 1 Pa and warm.pressure > 1 Pa
+}}
+"
+        )
+    };
+    write(&dir, "own.mtx", text("contents.temperature in 0 degC .. 40 degC"));
+    let said = flat(&matterixc_in(&dir, &["check", "--contents", "own.mtx", "--no-cache"]).out);
+    assert_eq!(said.matches("(outside its model)").count() > 0, said.contains("warm"), "{said}");
+    assert!(said.lines().all(|line| !line.contains("cold:") || !line.contains("outside")), "{said}");
+    write(&dir, "own.mtx", text("3 kPa"));
+    let said = flat(&matterixc_in(&dir, &["check", "own.mtx", "--no-cache"]).out);
+    assert!(said.contains("error"), "{said}");
+}

@@ -171,11 +171,13 @@ fn unit_panel(unit: &Unit, columns: Vec<(Column<'_>, bool)>) -> Option<Panel> {
             }
         }
     }
-    for (line, _) in panel.series.iter_mut().zip(outside).filter(|(_, outside)| *outside) {
-        line.name += " (at times outside its model)";
-    }
     kinds.truncate(4);
     panel.title = kinds.join(", ");
+    let outside: Vec<&str> =
+        panel.series.iter().zip(outside).filter(|(_, outside)| *outside).map(|(line, _)| line.name.as_str()).collect();
+    if !outside.is_empty() {
+        panel.title += &format!("; at times outside the model: {}", outside.join(", "));
+    }
     Some(panel)
 }
 
