@@ -712,8 +712,7 @@ fn build<'a>(
     let mut starts = checks::starts(&elaborator, lab);
     checks::model(&mut elaborator);
     elaborator.judge_conservation(&events, &plan);
-    let questions = (wanted == Wanted::Contents)
-        .then(|| Questions::of(&mut elaborator, properties(&observables)));
+    let questions = (wanted == Wanted::Contents).then(|| Questions::of(&mut elaborator, properties(&observables)));
     let asked = questions.as_ref().map(|q| q.nodes.as_slice());
     let checks::Judged { windows, seen, hazards } =
         checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);

@@ -13,6 +13,9 @@ use serde_json::Value;
 /// How far a well may be from its place in the definition, m: a grid of evenly spaced wells is one line.
 const EVEN: f64 = 2e-5;
 
+/// The place of a deck, mm (ANSI SLAS 1-2004).
+const PLACE: [f64; 2] = [127.76, 85.48];
+
 /// Definitions compiled at once: a lab has at most 20,000 parts.
 const AT_ONCE: usize = 16;
 
@@ -137,13 +140,18 @@ fn agrees(scene: &Scene, thing: &str, definition: &Value) {
             ([across("x"), across("y")], true)
         }
     };
+    // What is wider than its place begins at the front left corner of it.
+    let over = [size[0] - PLACE[0], size[1] - PLACE[1]];
+    let is_wide = !is_schema_3 && over.iter().any(|o| *o > 5.0) && definition["metadata"]["displayCategory"] != "trash";
+    let aside = if is_wide { over.map(|o| o / 2.0) } else { [0.0; 2] };
     for (name, well) in known {
         let part = scene.get(scene.find(&format!("{thing}[{name}]")).expect(name));
         let [x, y, z] = part.pose.position;
         // Places of schema 3 are seen from the back.
         let back = number(well, "y") + if is_schema_3 { size[1] / 2.0 } else { -size[1] / 2.0 };
-        let off = [x * 1e3 - (number(well, "x") - size[0] / 2.0), y * 1e3 - back, z * 1e3 - number(well, "z")];
-        assert!(off.iter().all(|o| o.abs() < EVEN * 1e3), "{thing}[{name}]: {off:?}");
+        let across = number(well, "x") - size[0] / 2.0 + aside[0];
+        let off = [x * 1e3 - across, y * 1e3 - back - aside[1], z * 1e3 - number(well, "z")];
+        assert!(off.iter().all(|o| o.abs() < EVEN * 1e3), "{thing}[{name}] of {}: {off:?}", definition["metadata"]);
         if let (Some(room), false) = (&part.room, definition["parameters"]["isTiprack"] == true) {
             assert!((room.size()[2] * 1e3 - number(well, "depth")).abs() < 1e-9, "{thing}[{name}]");
             let volume = number(well, "totalLiquidVolume");

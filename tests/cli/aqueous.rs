@@ -212,7 +212,10 @@ fn what_equilibria_make_attacks_a_wall_as_well() {
     let fluoride = "50 g of water + 10 mmol of F- + 10 mmol of Na+";
     let of = |name: &str, from: &str| poured(name, EQUILIBRIA, from, fluoride, "");
     let acid = of("etched", "50 g of water + 10 mmol of HCl");
-    assert!(acid.contains("`cup` comes to hold 3.990") && acid.contains("mmol of HF, which attacks its wall"), "{acid}");
+    assert!(
+        acid.contains("`cup` comes to hold 3.990") && acid.contains("mmol of HF, which attacks its wall"),
+        "{acid}"
+    );
     let salt = of("not_etched", "50 g of water + 10 mmol of NaCl");
     assert!(!salt.contains("attack"), "{salt}");
     // What is put in as such is one finding, not two.
@@ -236,7 +239,11 @@ fn a_named_result_of_a_library_step_is_a_use() {
             "mtx 1\nuse std::equilibria\nuse std::electrodes\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n{lines}}}\nworkflow go in bench {{\n{steps}}}\n"
         )
     };
-    write(&dir, "read.mtx", text("    let shown <- read meter\n    let ion <- read probe\n    note \"{shown} {ion}\"\n"));
+    write(
+        &dir,
+        "read.mtx",
+        text("    let shown <- read meter\n    let ion <- read probe\n    note \"{shown} {ion}\"\n"),
+    );
     let said = flat(&matterixc_in(&dir, &["check", "read.mtx", "--no-cache"]).out);
     assert!(said.contains("`meter` is not calibrated"), "{said}");
     assert!(said.contains("of `c` is used at an ionic strength of 3.00"), "{said}");

@@ -67,7 +67,8 @@ fn program() -> (Program, Sources) {
     let domain = Domain::Quantity(Unit::scaled("mol", 1.0));
     model.states = vec![State { name, domain, initial, scale: Some(1e-6), span: Span::default() }];
     let unit = Unit::scaled("mL", 1e-6);
-    model.observables = vec![Observable { name: "beaker.contents.volume".into(), value: vec![volume], unit, valid: None }];
+    model.observables =
+        vec![Observable { name: "beaker.contents.volume".into(), value: vec![volume], unit, valid: None }];
     model.mixtures = vec![Mixture {
         instance: InstanceId(3),
         extensive: vec![("amount[water]".into(), 0)],

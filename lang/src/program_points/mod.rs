@@ -285,7 +285,12 @@ impl Words<'_, '_> {
             // What a skill gives is its caller's to name.
             let named = !local.name.contains(' ') && sets(*i);
             if let Some(name) = result.or_else(|| named.then_some(local.name.as_str())) {
-                out.push(Fact { name: name.to_string(), value: quantity(known, local.unit.clone()), changed: true, outside: false });
+                out.push(Fact {
+                    name: name.to_string(),
+                    value: quantity(known, local.unit.clone()),
+                    changed: true,
+                    outside: false,
+                });
             }
         }
         out

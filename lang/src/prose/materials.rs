@@ -233,10 +233,13 @@ impl Prose<'_, '_> {
             let Some((first, _)) = terms.clone().next() else { continue };
             let warm = first.start.as_ref().map(|(node, unit)| words::quantity(&unit.show(self.at_first(*node))));
             let warm = warm.map(|t| format!(" at {t}")).unwrap_or_default();
-            let ph = self.ph_at_first(mixture).map(|(ph, holds)| match holds {
-                true => format!(" Its pH is {ph:.2}."),
-                false => format!(" Its pH is near {ph:.2}, outside the range of its model."),
-            }).unwrap_or_default();
+            let ph = self
+                .ph_at_first(mixture)
+                .map(|(ph, holds)| match holds {
+                    true => format!(" Its pH is {ph:.2}."),
+                    false => format!(" Its pH is near {ph:.2}, outside the range of its model."),
+                })
+                .unwrap_or_default();
             let (vessel, what, place) = (
                 self.instance(self.holder(mixture)).name.clone(),
                 (format!("{}{warm}", joined(&texts, "and")), ph),
