@@ -714,8 +714,11 @@ fn build<'a>(
     elaborator.judge_conservation(&events, &plan);
     let questions = (wanted == Wanted::Contents).then(|| Questions::of(&mut elaborator, properties(&observables)));
     let asked = questions.as_ref().map(|q| q.nodes.as_slice());
-    let checks::Judged { windows, seen, hazards } =
-        checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
+    let checks::Judged { windows, seen, hazards } = match tables.lacks_equilibria {
+        // What would be said of amounts follows from a mistake that is reported already.
+        true => checks::Judged::default(),
+        false => checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked),
+    };
     starts.windows = windows;
     let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
     let starts = Some(starts);

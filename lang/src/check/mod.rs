@@ -11,6 +11,7 @@ mod ignored;
 mod kinetics;
 mod mixing;
 mod returns;
+mod start;
 #[cfg(test)]
 mod tests;
 mod time;
@@ -66,6 +67,7 @@ pub fn lab(tables: &Tables<'_>, id: DeclId, seeing: &mut Seeing) -> Vec<Diagnost
 pub fn model(lab: &mut Elaborator<'_>) {
     kinetics::rates(lab);
     lab.judge_standing();
+    start::unsolved(lab);
 }
 
 pub use kinetics::{Starts, never_starts, starts};

@@ -113,6 +113,8 @@ pub struct Tables<'a> {
     pub reactions: Vec<ReactionDef<'a>>,
     /// Equilibria whose species are all known.
     pub equilibria: Vec<super::equilibria::EquilibriumDef<'a>>,
+    /// Whether one of these, or of the interactions, is wrong and so left out: what mixtures hold is then another thing than what is meant.
+    pub lacks_equilibria: bool,
     /// Interactions whose species are all known.
     pub interactions: Vec<super::interactions::InteractionDef<'a>>,
     /// Reactive groups, materials and what must not meet.
@@ -146,6 +148,7 @@ impl<'a> Tables<'a> {
             species: SpeciesTable::default(),
             reactions: Vec::new(),
             equilibria: Vec::new(),
+            lacks_equilibria: false,
             interactions: Vec::new(),
             screen: Screen::default(),
             stop: Stop::default(),
@@ -168,8 +171,10 @@ impl<'a> Tables<'a> {
         tables.species = SpeciesTable::new(names, &tables.properties, &mut diagnostics);
         tables.screen = compatibility(&tables, &mut diagnostics);
         tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
+        let before = diagnostics.len();
         tables.equilibria = super::equilibria::collect(names, &tables.species, &mut diagnostics);
         tables.interactions = super::interactions::collect(names, &tables.species, &mut diagnostics);
+        tables.lacks_equilibria = diagnostics[before..].iter().any(Diagnostic::is_error);
         (tables, diagnostics)
     }
 

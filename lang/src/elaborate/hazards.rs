@@ -73,9 +73,26 @@ impl Hazard {
 
     /// What is dangerous about which things.
     pub fn headline(&self) -> String {
-        let about = self.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
-        let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
+        let things: Vec<String> = self.things().map(|t| format!("`{t}`")).collect();
         format!("{}: {}", self.name.replace('_', " "), things.join(" and "))
+    }
+
+    /// The whole things that it is about, in words.
+    pub fn about(&self, lab: &Elaborator<'_>) -> String {
+        let whole = |name: &str| {
+            let mut id = (0..lab.instances.len()).find(|i| lab.instances[*i].name == name);
+            while let Some(owner) = id.and_then(|i| lab.instances[i].owner) {
+                id = Some(owner.0 as usize);
+            }
+            format!("`{}`", id.map_or(name, |i| lab.instances[i].name.as_str()))
+        };
+        let things: Vec<String> = self.things().map(whole).collect();
+        things.join(" with ")
+    }
+
+    /// The full names of the things that it is about.
+    fn things(&self) -> impl Iterator<Item = &str> {
+        self.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')')).split(", ")
     }
 
     /// An error, or a warning.

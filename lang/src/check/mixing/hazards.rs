@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use matterix_ir::listing::joined;
 use matterix_ir::model::{Domain, Event};
 use matterix_ir::plan::{Said, Step, StepId};
 use matterix_ir::scene::InstanceId;
@@ -17,8 +18,20 @@ use super::state::MixtureState;
 use super::uses::Stream;
 use crate::elaborate::hazards::{Hazard, Watched};
 
-/// Of so many things the same is told at one place.
+/// So many things have a finding of their own for the same hazard at one place; the last finding names the others.
 const MOST_THINGS: usize = 3;
+
+/// So many of the others are named.
+const MOST_NAMES: usize = 12;
+
+/// What was said of one hazard at one place.
+#[derive(Default)]
+struct Told {
+    /// Its combinations of things.
+    all: Vec<usize>,
+    /// The headline of the last finding of its own.
+    last: String,
+}
 
 /// The hazards of a lab, by the states they depend on.
 pub(super) struct Hazards {
@@ -31,7 +44,7 @@ pub(super) struct Hazards {
     /// Those of transfers that have come about, with what is said of them where a value is used.
     since: BTreeMap<usize, (Span, String)>,
     /// By place and hazard of values and transfers: those of its combinations of things that were told there.
-    told: BTreeMap<(Span, Span), Vec<usize>>,
+    told: BTreeMap<(Span, Span), Told>,
     /// What happens at once before each of them is asked.
     settling: Settling,
 }
@@ -238,13 +251,33 @@ impl Walk<'_, '_> {
         let once = hazard.watched != Watched::Steps || !hazard.said.is_empty();
         if once {
             let told = self.hazards.told.entry((d.span(), hazard.span)).or_default();
-            if told.contains(&i) || told.len() >= MOST_THINGS {
+            if told.all.contains(&i) {
                 return;
             }
-            told.push(i);
+            told.all.push(i);
+            if told.all.len() > MOST_THINGS {
+                return;
+            }
+            told.last.clone_from(&d.headline);
         }
         if !self.found.iter().any(|f| f.span() == d.span() && f.headline == d.headline) {
             self.found.push(d);
+        }
+    }
+
+    /// Names the things beside those that have a finding of their own in the last of these.
+    pub(super) fn tell_of_others(&mut self) {
+        for ((place, _), told) in &self.hazards.told {
+            let Some(others) = told.all.get(MOST_THINGS..).filter(|others| !others.is_empty()) else { continue };
+            let names: BTreeSet<String> = others.iter().map(|i| self.hazards.all[*i].about(self.eyes.lab)).collect();
+            let mut listed: Vec<String> = names.iter().take(MOST_NAMES).cloned().collect();
+            if names.len() > MOST_NAMES {
+                listed.push(format!("{} more", names.len() - MOST_NAMES));
+            }
+            let said = format!("the same holds for {}", joined(&listed, "and"));
+            if let Some(d) = self.found.iter_mut().find(|d| d.span() == *place && d.headline == told.last) {
+                d.help.insert(0, said);
+            }
         }
     }
 

@@ -150,6 +150,7 @@ pub fn mixing(subject: Subject<'_, '_>, ready: Ready) -> Vec<Diagnostic> {
     let begun = world.clone();
     walk.step(plan.root, world);
     orders::orders(&mut walk, &begun, || Times::of(subject));
+    walk.tell_of_others();
     walk.found
 }
 

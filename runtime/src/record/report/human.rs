@@ -106,7 +106,8 @@ fn containers(report: &Report) -> Option<String> {
 
 fn container(container: &ContainerReport) -> Option<String> {
     let mut table = Table::new(&[Left, Right, Right, Right, Right, Left]);
-    let there = |s: &&super::SpeciesReport| s.mass != 0.0 || s.put.is_some_and(|put| put != 0.0);
+    // A run that ends before its first moment knows no amounts.
+    let there = |s: &&super::SpeciesReport| !s.mass.is_nan() && (s.mass != 0.0 || s.put.is_some_and(|put| put != 0.0));
     if container.species.iter().filter(there).any(|s| s.put.is_some()) {
         table.row(["", "at equilibrium", "", "", "put in"]);
     }
