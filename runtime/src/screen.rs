@@ -6,6 +6,7 @@ mod condition;
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::convert::Infallible;
 
 use matterix_ir::model::{Action, Danger, Incompatible};
 use matterix_ir::plan::{Operation, Step, StepId};
@@ -96,6 +97,8 @@ pub struct Screen<'p> {
     going: Vec<StepId>,
     /// The operation that began or ended last.
     last: Option<StepId>,
+    /// Dangers that were warned of.
+    warned: BTreeSet<usize>,
     /// Errors that nobody has asked for yet, with the time.
     alarms: VecDeque<(f64, Alarm)>,
     found: Vec<Finding>,
@@ -150,6 +153,7 @@ impl<'p> Screen<'p> {
             above,
             going: Vec::new(),
             last: None,
+            warned: BTreeSet::new(),
             alarms: VecDeque::new(),
             found: Vec::new(),
         }
@@ -260,8 +264,11 @@ impl<'p> Screen<'p> {
             let now = self.conditions[index].holds(engine, &mut self.room);
             if !std::mem::replace(&mut self.there[index], now) && now {
                 let step = self.operation_at(None);
-                let found = self.danger(danger, step);
-                self.tell(time, &danger.name, step, found);
+                let found = self.danger(danger, step, |node| engine.eval(node));
+                // Of one danger a warning is enough, whatever its numbers are later.
+                if danger.severity == Severity::Error || self.warned.insert(index) {
+                    self.tell(time, &danger.name, step, found);
+                }
             }
         }
     }
@@ -320,12 +327,29 @@ impl<'p> Screen<'p> {
             let new = danger.severity == Severity::Error && !**there && !read.is_disjoint(&changed);
             new && matches!(engine.eval_with(danger.when, &states), v if v != 0.0 && !v.is_nan())
         })?;
-        Some(alarm(&danger.0.name, self.danger(danger.0, Some(step))))
+        Some(alarm(&danger.0.name, self.danger(danger.0, Some(step), |node| engine.eval_with(node, &states))))
     }
 
-    fn danger(&self, danger: &Danger, step: Option<StepId>) -> Diagnostic {
-        let span = self.place(step).unwrap_or(danger.span);
-        let mut found = Diagnostic::error(danger.code, span, danger.headline.clone(), "it happened here");
+    /// What a danger is, in its own words where it has some; `value` gives that of a node.
+    fn danger(&self, danger: &Danger, step: Option<StepId>, value: impl Fn(NodeId) -> f64) -> Diagnostic {
+        let instances = &self.program.scene.instances;
+        let name = |at: f64| instances.get(at as usize).map_or("nothing", |i| i.name.as_str()).to_owned();
+        let said = danger.said.iter().find(|said| value(said.node) == 1.0);
+        let words = said.and_then(|said| {
+            let known = |node| Ok::<_, Infallible>(Some(value(node)).filter(|v| v.is_finite()));
+            said.text.show(known, name).ok()
+        });
+        let mut whole = danger.about;
+        while let Some(owner) = whole.and_then(|id| instances.get(id.0 as usize)?.owner) {
+            whole = Some(owner);
+        }
+        let stands = whole.and_then(|id| instances.get(id.0 as usize)).map(|i| i.span).filter(|span| !span.is_empty());
+        let (span, label) = match (self.place(step), stands) {
+            (Some(span), _) => (span, "it happened here"),
+            (None, Some(span)) => (span, "true from the start"),
+            (None, None) => (danger.span, "declared here"),
+        };
+        let mut found = Diagnostic::error(danger.code, span, words.unwrap_or_else(|| danger.headline.clone()), label);
         found.severity = danger.severity;
         found.help.clone_from(&danger.help);
         found

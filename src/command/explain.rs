@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use matterix_ir::{Code, codes};
+use matterix_lang::library;
 
 use crate::Exit;
 use crate::args::ExplainArgs;
@@ -62,11 +63,19 @@ pub fn explanation(given: Option<&str>) -> Result<String, String> {
     if !family.is_empty() {
         return Ok(list(&family));
     }
+    if let Some(page) = of_library(&name) {
+        return Ok(page);
+    }
     Err(match nearest(&name) {
         Some(code) => format!("did you mean `{code}`?"),
         None => "`matterixc explain` lists all codes; for a name declared in a file use `matterixc explain NAME FILE`"
             .to_string(),
     })
+}
+
+/// What the library says of a hazard, a caution or a failure that it declares.
+fn of_library(name: &str) -> Option<String> {
+    library::MODULES.iter().find_map(|module| named(name, module.name, module.text))
 }
 
 /// The code in what was pasted: `error[unit-mismatch]:` is `unit-mismatch`, and so is the failure `unit_mismatch`.

@@ -63,4 +63,4 @@ pub use graph::{BinaryOp, Env, Graph, Leaves, NodeId, Op, UnaryOp};
 pub use program::Program;
 pub use quantity::Unit;
 pub use span::{FileId, Sources, Span};
-pub use text::{Text, TextPart};
+pub use text::{Said, Text, TextPart};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::equilibrium::{Part, Phase};
 use crate::scene::InstanceId;
-use crate::{Code, Graph, NodeId, Op, Severity, Span, Unit};
+use crate::{Code, Graph, NodeId, Op, Said, Severity, Span, Unit};
 
 /// What the numbers of a discrete or continuous state mean.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -426,6 +426,12 @@ pub struct Danger {
     pub when: NodeId,
     /// `above boiling point: `plate` and `beaker``.
     pub headline: String,
+    /// What is so, for each that it asks about: the first whose node holds counts, before the headline.
+    #[serde(default)]
+    pub said: Vec<Said>,
+    /// The first thing it is about.
+    #[serde(default)]
+    pub about: Option<InstanceId>,
     /// How to mend it.
     pub help: Vec<String>,
     /// Its declaration.

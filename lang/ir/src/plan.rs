@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::codes::{self, Code};
 use crate::model::{Action, Domain};
 use crate::scene::InstanceId;
-use crate::{NodeId, Span, Text, Unit};
+use crate::{NodeId, Said, Span, Text, Unit};
 
 /// The longest time a run takes unless set otherwise, s of lab time: 30 days.
 pub const LONGEST_RUN: f64 = 30.0 * 86_400.0;
@@ -83,15 +83,6 @@ pub struct Refusal {
     /// What is so where it does not hold, in words: for all of it, or for each that it asks about.
     #[serde(default)]
     pub said: Vec<Said>,
-}
-
-/// Words for where something does not hold.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Said {
-    /// What does not hold there: not 0 if it does.
-    pub node: NodeId,
-    /// The words.
-    pub text: Text,
 }
 
 impl Refusal {

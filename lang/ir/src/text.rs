@@ -12,6 +12,15 @@ pub struct Text {
     pub parts: Vec<TextPart>,
 }
 
+/// Words for where something is so.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Said {
+    /// What is so there: not 0 if it is.
+    pub node: NodeId,
+    /// The words.
+    pub text: Text,
+}
+
 /// A piece of a [`Text`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TextPart {

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Danger;
 
-use matterix_ir::plan::{Said, Term};
+use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Severity, Span, codes};
+use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Said, Severity, Span, codes};
 
 use super::tuples::{Tuples, has};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
@@ -110,6 +110,8 @@ pub fn dangers(hazards: &[Hazard]) -> Vec<Danger> {
         severity: h.severity(),
         when: h.when,
         headline: h.headline(),
+        said: h.said.clone(),
+        about: h.about,
         help: h.help.iter().cloned().collect(),
         span: h.span,
     };

@@ -1,7 +1,6 @@
 //! Texts for people, with values in them.
 
-use matterix_ir::plan::Said;
-use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
+use matterix_ir::{Diagnostic, NodeId, Said, Span, Text, TextPart, codes};
 
 use super::{Scope, Value};
 use crate::ast;

@@ -1,8 +1,8 @@
 //! Labels and conditions in the words of the source.
 
-use matterix_ir::plan::{Comparison, Condition, Refusal, Said};
+use matterix_ir::plan::{Comparison, Condition, Refusal};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{NodeId, Span};
+use matterix_ir::{NodeId, Said, Span};
 
 use super::Planner;
 use super::call::Bound;

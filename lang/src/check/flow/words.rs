@@ -3,8 +3,8 @@
 use std::convert::Infallible;
 
 use matterix_ir::model::Domain;
-use matterix_ir::plan::{Condition, Said};
-use matterix_ir::{TextPart, Unit};
+use matterix_ir::plan::Condition;
+use matterix_ir::{Said, TextPart, Unit};
 
 use super::Interpreter;
 use super::report::shown;

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use matterix_ir::listing::joined;
 use matterix_ir::model::{Domain, Event};
-use matterix_ir::plan::{Said, Step, StepId};
+use matterix_ir::plan::{Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, FileId, Span};
+use matterix_ir::{Diagnostic, FileId, Said, Span};
 
 use super::Walk;
 use super::evaluator::NodeEvaluator;

@@ -96,7 +96,7 @@ impl<'l> Interpreter<'l, '_> {
     }
 
     fn danger(&mut self, hazard: &Hazard, facts: &AbstractState) -> Diagnostic {
-        let is_so = |said: &&matterix_ir::plan::Said| self.eval(said.node, facts).truth() == Some(true);
+        let is_so = |said: &&matterix_ir::Said| self.eval(said.node, facts).truth() == Some(true);
         let said = hazard.said.iter().find(is_so);
         let lab = self.lab;
         let instance = |at: f64| lab.instances.get(at as usize).map_or("nothing", |i| i.name.as_str()).to_string();
