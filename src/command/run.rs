@@ -1,9 +1,10 @@
 //! `matterixc run`.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use matterix_ir::{Diagnostic, Program};
+use matterix_ir::{Diagnostic, Program, Span};
 use matterix_runtime::exec::Turn;
 use matterix_runtime::record::Folder;
 
@@ -93,6 +94,8 @@ fn turns(args: &RunArgs, program: &Program, cancel: &AtomicBool) -> Result<Resul
 /// Findings of compiler and run, on standard error.
 pub(super) struct Findings {
     reporter: Reporter,
+    /// What was shown: a run finds again what the check has found.
+    shown: HashSet<(Span, String)>,
 }
 
 impl Findings {
@@ -101,11 +104,15 @@ impl Findings {
             RunFormat::Human => Format::Human,
             RunFormat::Json => Format::Json,
         };
-        Findings { reporter: Reporter::new(format, terminal::look(Stream::Err, color)) }
+        let reporter = Reporter::new(format, terminal::look(Stream::Err, color));
+        Findings { reporter, shown: HashSet::new() }
     }
 
-    pub(super) fn show(&mut self, sources: &matterix_ir::Sources, diagnostics: Vec<matterix_ir::Diagnostic>) {
-        paint(Stream::Err, &self.reporter.render(sources, diagnostics));
+    pub(super) fn show(&mut self, sources: &matterix_ir::Sources, diagnostics: Vec<Diagnostic>) {
+        let new = |d: &Diagnostic| !self.shown.contains(&(d.span(), d.headline.clone()));
+        let new: Vec<Diagnostic> = diagnostics.into_iter().filter(new).collect();
+        self.shown.extend(new.iter().map(|d| (d.span(), d.headline.clone())));
+        paint(Stream::Err, &self.reporter.render(sources, new));
     }
 
     pub(super) fn end(&self) {

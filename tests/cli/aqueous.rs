@@ -324,3 +324,161 @@ workflow go in bench {{
     let said = flat(&matterixc_in(&dir, &["check", "own.mtx", "--no-cache"]).out);
     assert!(said.contains("error"), "{said}");
 }
+
+#[test]
+fn a_metal_ion_left_out_is_told_of_beside_base_too() {
+    for (name, into) in [
+        ("iron_alone", "50 g of water + 1 mmol of Fe3+ + 3 mmol of Cl-"),
+        ("iron_and_lye", "50 g of water + 1 mmol of Fe3+ + 3 mmol of Cl- + 3 mmol of NaOH"),
+        ("copper_and_lye", "50 g of water + 1 mmol of Cu2+ + 2 mmol of Cl- + 2 mmol of NaOH"),
+    ] {
+        let said = poured(name, EQUILIBRIA, "50 g of water", into, "    note \"{cup.contents.ph}\"");
+        assert!(said.contains("`cup` ignores"), "{name}: {said}");
+    }
+    let sodium = poured(
+        "lye_alone",
+        EQUILIBRIA,
+        "50 g of water",
+        "50 g of water + 3 mmol of NaOH",
+        "    note \"{cup.contents.ph}\"",
+    );
+    assert!(!sodium.contains("ignores"), "{sodium}");
+}
+
+/// Silver is in the chloride, and the iodide, for which the file has no equilibrium, would take it.
+#[test]
+fn a_salt_left_out_is_told_of_beside_another_of_its_ions() {
+    let into = "50 g of water + 1 mmol of AgNO3 + 1 mmol of KI + 2 mmol of NaCl";
+    let said = poured("iodide_left_out", EQUILIBRIA, "50 g of water", into, "");
+    assert!(said.contains("`cup` holds more AgI than dissolves"), "{said}");
+    let with = "use std::equilibria\nuse std::solids\n";
+    let said = poured("iodide_there", with, "50 g of water", into, "");
+    assert!(!said.contains("more AgI"), "{said}");
+}
+
+#[test]
+fn a_conductivity_needs_the_ions_that_equilibria_make() {
+    let lines = |held: &str| {
+        format!(
+            "    c = Beaker250mL at (2, 0, 0) m holding 100 g of water + {held}\n    probe = ConductivityProbe {{ probes: c }} at (2, 1, 0) m"
+        )
+    };
+    let dir = folder("conductivity_of_what");
+    let said = |uses: &str, held: &str| {
+        let text = format!(
+            "mtx 1\n{uses}use std::electrodes\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n{}\n}}\nworkflow go in bench {{\n    expect probe.conductivity < 1 S/m\n}}\n",
+            lines(held)
+        );
+        write(&dir, "probe.mtx", text);
+        flat(&matterixc_in(&dir, &["check", "probe.mtx", "--no-cache"]).out)
+    };
+    for held in ["1 mmol of HCl + 1 mmol of NaOH", "10 mmol of acetic_acid", "10 mmol of NH3"] {
+        assert!(said("", held).contains("counts ions as they were put in"), "{held}");
+        assert!(!said(EQUILIBRIA, held).contains("as they were put in"), "{held}");
+    }
+    assert!(!said("", "1 mmol of KCl").contains("as they were put in"));
+}
+
+#[test]
+fn a_window_of_ph_holds_where_there_is_a_ph() {
+    let dir = folder("window_of_what");
+    let said = |uses: &str, held: &str| {
+        let text = format!(
+            "mtx 1\n{uses}use std::glassware::Beaker250mL\nasset Medium: Beaker250mL, PhWindow {{ ph_window: 6 .. 8 }}\nlab bench {{\n    ambient: 25 degC\n    cup = Medium at (0, 0, 0) m holding {held}\n}}\nworkflow go in bench {{\n    wait 1 s\n    expect cup.contents.mass > 1 g\n}}\n"
+        );
+        write(&dir, "window.mtx", text);
+        flat(&matterixc_in(&dir, &["check", "window.mtx", "--no-cache"]).out)
+    };
+    assert!(!said(EQUILIBRIA, "10 g of ethanol").contains("window"), "no water, no pH");
+    assert!(said("", "50 g of water + 1 mmol of acetic_acid").contains("counts strong acids and bases only"));
+    assert!(said(EQUILIBRIA, "50 g of water + 200 mmol of NaCl").contains("outside the range of its model"));
+    let fine = said(EQUILIBRIA, "50 g of water + 1 mmol of H2PO4- + 1 mmol of HPO4^2- + 3 mmol of Na+");
+    assert!(fine.contains("no findings"), "{fine}");
+}
+
+#[test]
+fn buffers_are_what_the_electrode_is_told() {
+    let dir = folder("wrong_buffers");
+    let said = |stated: &str| {
+        let text = format!(
+            "mtx 1\nuse std::equilibria\nuse std::electrodes\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n    acid = Beaker250mL at (0, 0, 0) m holding 100 g of water + 5 mmol of acetic_acid + 5 mmol of acetate + 5 mmol of Na+\n    neutral = Beaker250mL at (1, 0, 0) m holding 100 g of water + 5 mmol of H2PO4- + 5 mmol of HPO4^2- + 15 mmol of Na+\n    meter = GlassElectrode {{ probes: acid }} at (2, 0, 0) m\n}}\nworkflow go in bench {{\n    calibrate meter with (acid, neutral) at ({stated})\n    expect meter.shown > 1\n}}\n"
+        );
+        write(&dir, "buffers.mtx", text);
+        flat(&matterixc_in(&dir, &["check", "buffers.mtx", "--no-cache"]).out)
+    };
+    assert!(said("4.66, 6.84").contains("no findings"), "{}", said("4.66, 6.84"));
+    let wrong = said("5.66, 7.84");
+    assert!(wrong.contains("out-of-range") && wrong.contains("`meter` is told 5.66 and 7.84"), "{wrong}");
+}
+
+#[test]
+fn things_beyond_the_third_are_named() {
+    let dir = folder("many_of_one");
+    let cups: String = (0..6)
+        .map(|i| format!("    c{i} = Beaker250mL at ({i}, 0, 0) m holding 100 g of water + 20{i} mmol of HCl\n"))
+        .collect();
+    let shown: String = (0..6).map(|i| format!("{{c{i}.contents.ph}} ")).collect();
+    let text = format!(
+        "mtx 1\nuse std::equilibria\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n{cups}}}\nworkflow go in bench {{\n    note \"{shown}\"\n}}\n"
+    );
+    write(&dir, "six.mtx", text);
+    let said = flat(&matterixc_in(&dir, &["check", "six.mtx", "--no-cache"]).out);
+    assert_eq!(said.matches("is used at an ionic strength").count(), 3, "{said}");
+    assert_eq!(said.matches("the same holds for `c3`, `c4` and `c5`").count(), 1, "{said}");
+}
+
+#[test]
+fn contents_without_an_equilibrium_are_found_before_the_run() {
+    let said = poured("no_solution", EQUILIBRIA, "50 g of water", "1 mg of water + 20 g of NaOH", "");
+    assert!(said.contains("not-a-number") && said.contains("`cup` has no equilibrium at the start"), "{said}");
+}
+
+#[test]
+fn a_wrong_equilibrium_brings_no_findings_on_amounts() {
+    let dir = folder("wrong_equilibrium");
+    let text = "mtx 1
+use std::glassware::Beaker250mL
+species HX { formula: \"C2HF3O2\" }
+species X- { formula: \"C2F3O2\", charge: -1 }
+equilibrium w: water <-> H+ + OH- { constant: 1e-14, enthalpy: 55.8 kJ/mol }
+equilibrium hx: HX <-> 2 H+ + X- { log_constant: -2 }
+lab bench {
+    ambient: 25 degC
+    cup = Beaker250mL at (0, 0, 0) m holding 100 g of water + 1 mmol of HX
+}
+workflow look in bench {
+    wait 1 s
+    expect cup.contents.ph in 2 .. 2.7
+}
+";
+    write(&dir, "wrong.mtx", text);
+    let said = flat(&matterixc_in(&dir, &["check", "wrong.mtx", "--no-cache"]).out);
+    assert!(said.contains("unbalanced") && !said.contains("expectation-failed"), "{said}");
+}
+
+#[test]
+fn a_run_says_what_it_finds_in_words_and_once() {
+    let dir = folder("said_once");
+    let text = "mtx 1
+use std::equilibria
+use std::glassware::Beaker250mL
+lab bench {
+    ambient: 25 degC
+    cup = Beaker250mL at (0, 0, 0) m holding 100 g of water + 1 mmol of AgNO3 + 1 mmol of NaCl
+}
+workflow look in bench {
+    wait 1 s
+    expect cup.contents.mass > 1 g
+}
+";
+    write(&dir, "cup.mtx", text);
+    let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
+    let said = flat(&(ran.err + &ran.out));
+    assert_eq!(
+        said.matches("`cup` holds precipitated AgCl").count(),
+        2,
+        "once as a warning, once in the report: {said}"
+    );
+    let page = matterixc_in(&dir, &["explain", "buffer_exhausted"]).out;
+    assert!(page.contains("`std::solutions` declares this name"), "{page}");
+}
