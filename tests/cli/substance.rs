@@ -70,11 +70,89 @@ fn every_number_is_printed_with_its_source_in_full() {
     assert!(dioxane.contains("`use std::substances`, or `use std::substances::dioxane`"), "{dioxane}");
 }
 
+/// The lines below a heading of a page.
+fn below<'a>(page: &'a str, heading: &str) -> &'a str {
+    let after = page.split_once(heading).unwrap_or_else(|| panic!("no `{heading}`: {page}")).1;
+    after.split("\n\n").next().unwrap_or_default()
+}
+
 #[test]
-fn its_equilibria_are_listed() {
+fn its_equilibria_are_listed_with_their_constants() {
     let page = asked(&["acetic_acid"]);
-    let line = "  equilibria            acetic_acid_splits: acetic_acid <-> H+ + acetate (std::equilibria)\n";
-    assert!(page.contains(line), "{page}");
+    let acids = below(&page, "Equilibria, acids and bases:\n");
+    assert_eq!(
+        acids,
+        "  acetic_acid <-> H+ + acetate (std::equilibria)\n      pKa 4.756 at 25 degC, enthalpy -0.41 kJ/mol, valid 0 degC .. 60 degC [gkl]"
+    );
+    assert!(flat(&page).contains("[gkl] Goldberg, Kishore and Lennen"), "{page}");
+    // One that is given at every temperature, of a gas, and of an acid.
+    let page = asked(&["CO2"]);
+    assert!(below(&page, "Equilibria, gases:\n").contains("      log K -1.474 at 25 degC"), "{page}");
+    assert!(below(&page, "Equilibria, acids and bases:\n").contains("      pKa 6.352 at 25 degC"), "{page}");
+    let page = asked(&["zinc_sulfate_heptahydrate"]);
+    assert!(below(&page, "Equilibria, half-cells:\n").contains("E -0.763 V at 25 degC"), "{page}");
+    assert!(!asked(&["naphthalene"]).contains("Equilibria"));
+}
+
+#[test]
+fn equilibria_of_the_ions_of_a_salt_follow_its_own() {
+    let page = asked(&["AgCl"]);
+    let solids = below(&page, "Equilibria, solubility:\n");
+    assert!(solids.starts_with("  AgCl <-> Ag+ + Cl- (std::equilibria)\n      pKsp 9.75 at 25 degC"), "{page}");
+    assert!(solids.contains("  AgBr <-> Ag+ + Br- (std::solids, of Ag+)\n"), "{page}");
+    // Numbers of several sources name each, in full below.
+    let complexes = below(&page, "Equilibria, complexes:\n");
+    assert!(complexes.contains("[wat] [sit]"), "{page}");
+    assert!(flat(&page).contains("[sit] sit.dat of PHREEQC 3"), "{page}");
+    // Six of a kind, and how to see the others.
+    assert_eq!(complexes.matches("log K").count(), 6, "{page}");
+    let said = complexes.lines().last().expect("lines");
+    let more: usize = said.trim().split(' ').nth(1).and_then(|n| n.parse().ok()).expect("a number");
+    assert_eq!(said, format!("  and {more} more: `--all` shows them"));
+    let all = asked(&["AgCl", "--all"]);
+    assert_eq!(below(&all, "Equilibria, complexes:\n").matches("log K").count(), 6 + more, "{all}");
+    // What water and its ions do says nothing of a base.
+    assert!(!asked(&["NaOH"]).contains("of OH-"));
+}
+
+#[test]
+fn constants_are_there_for_programs() {
+    let object: Value = serde_json::from_str(&asked(&["NaCl", "--format", "json"])).expect("it is JSON");
+    let all = object["substances"][0]["equilibria"].as_array().expect("a list");
+    let of = |name: &str| all.iter().find(|e| e["name"] == name).unwrap_or_else(|| panic!("{name}: {all:?}"));
+    let own = of("NaCl_dissolves");
+    assert_eq!(
+        (&own["kind"], &own["ion"], &own["module"]),
+        (&"solubility".into(), &Value::Null, &"std::brines".into())
+    );
+    assert_eq!((&own["constant"]["symbol"], &own["constant"]["value"]), (&"log K".into(), &"1.582".into()));
+    let pair = of("NaSO4_forms");
+    assert_eq!(
+        (&pair["kind"], &pair["ion"], &pair["constant"]["at"]),
+        (&"complexes".into(), &"Na+".into(), &"25 degC".into())
+    );
+    assert_eq!((&pair["enthalpy"], &pair["valid"]), (&"4.69 kJ/mol".into(), &"0 degC .. 60 degC".into()));
+    assert_eq!(pair["sources"][0]["tag"], "wat");
+    assert!(all.len() > 20, "{}", all.len());
+}
+
+#[test]
+fn an_equilibrium_of_a_file_is_shown_as_it_states_it() {
+    let text = "mtx 1\nspecies HIn { formula: \"C8H9NO2\" }\nspecies In- { formula: \"C8H8NO2-\" }\nequilibrium turns: HIn <-> H+ + In- { pka: 7.1, at: 20 degC, source: \"our notebook\" }\n\
+                equilibrium worked_out: 2 HIn <-> H+ + HIn + In- { analytic: [1 / 3, 2] }\n";
+    let file = write(&folder("substance_equilibria"), "own.mtx", text);
+    let page = asked(&["HIn", "--file", &file]);
+    let acids = below(&page, "Equilibria, acids and bases:\n");
+    assert!(acids.contains("      pKa 7.1 at 20 degC (our notebook)"), "{page}");
+    // What is no list of plain numbers is shown as written.
+    assert!(page.contains("[1 / 3, 2] at T in K"), "{page}");
+}
+
+#[test]
+fn a_salt_is_no_ion_of_the_same_letters() {
+    let page = asked(&["FeSO4"]);
+    assert!(!page.contains("FeSO4+\n"), "{page}");
+    assert!(page.contains("As a formula without its water `FeSO4` is:\n  iron_II_sulfate_heptahydrate"), "{page}");
 }
 
 #[test]
