@@ -226,3 +226,73 @@ fn a_substance_that_is_not_imported_is_offered_with_its_import() {
     let ended = matterixc(&["check", &wrong]);
     assert!(flat(&ended.out).contains("`dioxane`"), "{}", ended.out);
 }
+
+/// What a check says of a species that is not declared.
+fn told(name: &str) -> String {
+    let file =
+        write(&folder("substance_kin"), &format!("{name}.mtx"), lab("", &format!("10 mL of water + 1 mmol of {name}")));
+    let ended = matterixc(&["check", &file]);
+    assert_eq!(ended.code, 1, "{name}: {}", ended.out);
+    flat(&ended.out)
+}
+
+#[test]
+fn a_formula_is_answered_by_the_substance_that_has_it() {
+    for (formula, name) in [
+        ("NaH2PO4", "std::salts::sodium_dihydrogen_phosphate"),
+        ("Na2HPO4", "std::salts::disodium_hydrogen_phosphate"),
+        ("CaCl2", "std::salts::calcium_chloride"),
+        ("MgSO4", "std::salts::magnesium_sulfate"),
+        ("FeCl3", "std::salts::iron_III_chloride"),
+        ("K2Cr2O7", "std::equilibria::potassium_dichromate"),
+    ] {
+        let (said, last) = (told(formula), name.rsplit("::").next().expect("a name"));
+        assert!(said.contains(&format!("`{last}` (`use {name}`) has this formula")), "{formula}: {said}");
+        assert!(!said.contains("did you mean"), "{formula}: {said}");
+    }
+    // By the letters dichloromethane is near.
+    assert!(!told("CaCl2").contains("CH2Cl2"));
+    // Hydrates are offered as such, and names by which chemists call a substance.
+    assert!(told("Na3PO4").contains(
+        "`trisodium_phosphate_dodecahydrate` (`use std::salts::trisodium_phosphate_dodecahydrate`) is a hydrate of it"
+    ));
+    assert!(told("Tris").contains("`tris` (`use std::equilibria::tris`) is also called that"));
+    assert!(told("CH3COOH").contains("help: `acetic_acid` is also called that"));
+    // Isomers are all named.
+    let isomers = told("C3H8O");
+    assert!(isomers.contains("`iPrOH`") && isomers.contains("`use std::substances::"), "{isomers}");
+    // A salt that there is not is written as its ions.
+    let ions = told("RbBr");
+    assert!(!ions.contains("help"), "{ions}");
+    let ions = told("NH4OH");
+    assert!(ions.contains("write its ions, per mole 1 mol of `NH4+` and 1 mol of `OH-`"), "{ions}");
+    // Letters decide where a formula was misread, or the elements are the same.
+    assert!(told("NaCI").contains("did you mean `NaCl`?"));
+    assert!(told("H2S04").contains("did you mean `H2SO4`?"));
+    assert!(told("Cu2SO4").contains("did you mean `CuSO4`?"));
+}
+
+#[test]
+fn the_species_of_a_file_goes_before_those_of_the_library() {
+    let own = "species our_chloride { formula: \"CaCl2\", molar_volume: 50 mL/mol, heat_capacity: 70 J/(mol*K) }\n";
+    let file = write(&folder("substance_own"), "own.mtx", lab(own, "10 mL of water + 1 mmol of CaCl2"));
+    let said = flat(&matterixc(&["check", &file]).out);
+    assert!(said.contains("did you mean `our_chloride`?") && !said.contains("std::salts"), "{said}");
+}
+
+#[test]
+fn a_fix_writes_the_name_and_its_import() {
+    let dir = folder("substance_fix");
+    let file = write(&dir, "salts.mtx", lab("", "10 mL of water + 1 mmol of KH2PO4 + 1 mmol of K2HPO4"));
+    assert_eq!(matterixc(&["check", "--fix=all", &file]).code, 0);
+    let mended = std::fs::read_to_string(&file).expect("it is there");
+    for line in ["potassium_dihydrogen_phosphate", "dipotassium_hydrogen_phosphate"] {
+        assert_eq!(mended.matches(line).count(), 2, "{mended}");
+    }
+    // Only a person knows which hydrate is in the bottle.
+    let file = write(&dir, "hydrate.mtx", lab("", "10 mL of water + 1 g of FeSO4"));
+    assert_eq!(matterixc(&["check", "--fix=all", &file]).code, 1);
+    let imported = write(&dir, "imported.mtx", lab("use std::salts::NaH2PO4\n", "10 mL of water"));
+    let said = flat(&matterixc(&["check", &imported]).out);
+    assert!(said.contains("did you mean `sodium_dihydrogen_phosphate`?"), "{said}");
+}
