@@ -686,6 +686,9 @@ pub struct SubstanceArgs {
     /// Also search the species of this file.
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
+    /// Show all equilibria of the substance and its ions, not only the first of each kind.
+    #[arg(long)]
+    pub all: bool,
     /// The format of the answer.
     #[arg(long, value_enum, default_value_t = SubstanceFormat::Human)]
     pub format: SubstanceFormat,

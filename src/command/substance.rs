@@ -1,10 +1,10 @@
 //! `matterixc substance`.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use matterix_ir::listing::joined;
-use matterix_lang::catalogue::{Catalogue, Found, Source, Stated, Substance};
+use matterix_lang::catalogue::{Catalogue, Found, Part, Source, Stated, Substance};
 use serde_json::{Value, json};
 
 use crate::Exit;
@@ -16,6 +16,8 @@ use crate::terminal::{Stream, print, print_error};
 /// Columns of a page, and of the names of its properties.
 const WIDTH: usize = 99;
 const NAMES: usize = 22;
+/// Equilibria of one kind that a page shows unasked.
+const SHOWN: usize = 6;
 
 /// Prints what is known of a substance and where each number comes from.
 pub fn substance(args: &SubstanceArgs) -> Exit {
@@ -40,7 +42,7 @@ fn attempt(args: &SubstanceArgs) -> Result<Exit, String> {
         return Ok(Exit::Findings);
     };
     let text = match args.format {
-        SubstanceFormat::Human => pages(word, first, others),
+        SubstanceFormat::Human => pages(word, first, others, args.all),
         SubstanceFormat::Json => {
             let substances: Vec<Value> = first.substances.iter().map(|s| object(s)).collect();
             let answer = json!({ "asked": word, "by": first.by, "substances": substances });
@@ -52,9 +54,9 @@ fn attempt(args: &SubstanceArgs) -> Result<Exit, String> {
 }
 
 /// The page of the one that is meant, or a list of those that may be; and what else the word stands for.
-fn pages(word: &str, first: &Found<'_>, others: &[Found<'_>]) -> String {
+fn pages(word: &str, first: &Found<'_>, others: &[Found<'_>], all: bool) -> String {
     let mut out = match first.substances.as_slice() {
-        [one] => page(one),
+        [one] => page(one, all),
         several => format!("{} substances have the {} `{word}`:\n{}", several.len(), first.by, list(several)),
     };
     for group in others {
@@ -68,7 +70,7 @@ fn list(substances: &[&Substance]) -> String {
     substances.iter().map(|s| format!("  {:width$}  {} ({})\n", s.name, s.title(), s.module)).collect()
 }
 
-fn page(s: &Substance) -> String {
+fn page(s: &Substance, all: bool) -> String {
     let mut out = format!("{}\n{}", s.name, wrapped("  ", &s.about));
     let mut line = |name: &str, value: &str| out += &format!("  {:NAMES$}{value}\n", words(name));
     if !s.aliases.is_empty() {
@@ -82,16 +84,12 @@ fn page(s: &Substance) -> String {
             line("molar mass", &format!("{:.3} g/mol", mass * 1e3));
         }
     }
-    let mut tags: BTreeMap<&str, &str> = BTreeMap::new();
+    let mut sources: BTreeSet<(&str, &str)> = BTreeSet::new();
     for stated in &s.stated {
         line(&stated.property, &format!("{}{}", value(stated), note(stated)));
         if let Some(Source { tag: Some(tag), text, .. }) = &stated.source {
-            tags.insert(tag, text);
+            sources.insert((tag, text));
         }
-    }
-    for (index, part) in s.equilibria.iter().enumerate() {
-        let heading = if index == 0 { "equilibria" } else { "" };
-        line(heading, &format!("{}: {} ({})", part.name, part.equation, part.module));
     }
     let there = match &s.import {
         Some(import) => format!("`{import}`, or `{import}::{}`", s.name),
@@ -99,11 +97,40 @@ fn page(s: &Substance) -> String {
         None => format!("declared in {}", s.module),
     };
     line("to use it", &there);
-    if !tags.is_empty() {
+    for group in s.equilibria.chunk_by(|a, b| a.kind == b.kind) {
+        out += &format!("\n{}:\n", heading(group));
+        let shown = if all { group.len() } else { SHOWN };
+        for part in group.iter().take(shown) {
+            out += &equilibrium(part);
+            sources.extend(part.sources.iter().filter_map(|of| Some((of.tag.as_deref()?, of.text.as_str()))));
+        }
+        if let more @ 1.. = group.len().saturating_sub(shown) {
+            out += &format!("  and {more} more: `--all` shows them\n");
+        }
+    }
+    if !sources.is_empty() {
         out += "\nSources:\n";
-        tags.iter().for_each(|(tag, text)| out += &wrapped("  ", &format!("[{tag}] {text}")));
+        sources.iter().for_each(|(tag, text)| out += &wrapped("  ", &format!("[{tag}] {text}")));
     }
     out
+}
+
+/// What a group of equilibria is about: `Equilibria, acids and bases`.
+fn heading(group: &[Part]) -> String {
+    let kind = group.first().map_or("", |part| part.kind.name());
+    format!("Equilibria, {kind}")
+}
+
+/// An equilibrium over two lines: what it is, and its numbers.
+fn equilibrium(part: &Part) -> String {
+    let of = part.ion.as_ref().map_or_else(String::new, |ion| format!(", of {ion}"));
+    let mut numbers: Vec<String> = Vec::new();
+    numbers.extend(part.constant.as_ref().map(|c| format!("{} {} at {}", c.symbol, c.value, c.at)));
+    numbers.extend(part.enthalpy.as_ref().map(|enthalpy| format!("enthalpy {enthalpy}")));
+    numbers.extend(part.valid.as_ref().map(|valid| format!("valid {valid}")));
+    let sources: String = part.sources.iter().map(said).collect();
+    let first = wrapped("  ", &format!("{} ({}{of})", part.equation, part.module));
+    first + &wrapped("      ", &format!("{}{sources}", numbers.join(", ")))
 }
 
 /// `boiling_point` as words.
@@ -117,11 +144,15 @@ fn value(stated: &Stated) -> String {
 }
 
 fn note(stated: &Stated) -> String {
-    match &stated.source {
-        None => String::new(),
-        Some(Source { tag: Some(tag), remark, .. }) if remark.is_empty() => format!("  [{tag}]"),
-        Some(Source { tag: Some(tag), remark, .. }) => format!("  [{tag}] {remark}"),
-        Some(Source { tag: None, text, .. }) => format!("  ({text})"),
+    stated.source.as_ref().map_or_else(String::new, said)
+}
+
+/// A source behind its number.
+fn said(source: &Source) -> String {
+    match source {
+        Source { tag: Some(tag), remark, .. } if remark.is_empty() => format!("  [{tag}]"),
+        Source { tag: Some(tag), remark, .. } => format!("  [{tag}] {remark}"),
+        Source { tag: None, text, .. } => format!("  ({text})"),
     }
 }
 
@@ -140,19 +171,27 @@ fn object(s: &Substance) -> Value {
         .stated
         .iter()
         .map(|stated| {
-            let source =
-                stated.source.as_ref().map(|of| json!({ "tag": of.tag, "text": of.text, "remark": of.remark }));
+            let source = stated.source.as_ref().map(source);
             json!({ "property": stated.property, "value": stated.value, "source": source })
         })
         .collect();
-    let equilibria: Vec<Value> = s
-        .equilibria
-        .iter()
-        .map(|part| json!({ "name": part.name, "equation": part.equation, "module": part.module }))
-        .collect();
+    let equilibria: Vec<Value> = s.equilibria.iter().map(part).collect();
     json!({
         "name": s.name, "aliases": s.aliases, "about": s.about, "module": s.module, "use": s.import, "formula": s.formula,
         "molar_mass": s.molar_mass.map(|mass| mass * 1e3), "cas": s.cas, "smiles": s.smiles, "properties": properties,
         "equilibria": equilibria,
+    })
+}
+
+fn source(of: &Source) -> Value {
+    json!({ "tag": of.tag, "text": of.text, "remark": of.remark })
+}
+
+fn part(part: &Part) -> Value {
+    let constant = part.constant.as_ref().map(|c| json!({ "symbol": c.symbol, "value": c.value, "at": c.at }));
+    let sources: Vec<Value> = part.sources.iter().map(source).collect();
+    json!({
+        "name": part.name, "equation": part.equation, "module": part.module, "kind": part.kind.name(), "ion": part.ion,
+        "constant": constant, "enthalpy": part.enthalpy, "valid": part.valid, "sources": sources,
     })
 }

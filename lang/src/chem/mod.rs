@@ -1,6 +1,7 @@
 //! Chemistry without diagnostics: formulas, structures, balances and templates with typed errors.
 
 pub mod balance;
+pub mod constants;
 pub mod elements;
 pub mod formula;
 pub mod pattern;

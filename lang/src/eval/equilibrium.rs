@@ -12,7 +12,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
-use crate::declare::equilibria::{ANALYTIC, CONSTANTS, HEAT, LOG_PARTITION, PARTITION, POTENTIAL};
+use crate::chem::constants::{ANALYTIC, CONSTANTS, HEAT, LOG_PARTITION, PARTITION, POTENTIAL};
 use crate::declare::species::field;
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::interactions::Acting;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::{Diagnostic, Edit, FileId, Fix, Label, Missing, Span};
 
+use super::kin::of_name;
 use super::{Module, Names};
 use crate::ast::{ItemKind, Name, Path};
 use crate::syntax;
@@ -13,9 +14,9 @@ pub struct Import {
     /// The module with the name: `std::heating`.
     module: String,
     /// As it stands after `use`.
-    path: String,
+    pub(super) path: String,
     /// How a file that is not of the library lets it be added.
-    missing: Option<Missing>,
+    pub(super) missing: Option<Missing>,
 }
 
 impl Import {
@@ -32,8 +33,7 @@ impl Import {
 impl Names<'_> {
     /// The import that a module lacks for a name which another one declares for what `fits`.
     pub fn import_of(&self, into: usize, name: &str, fits: impl Fn(&ItemKind) -> bool) -> Option<Import> {
-        let unread =
-            || ItemKind::Species { name: Name { text: name.to_string(), span: Span::default() }, fields: Vec::new() };
+        let unread = || of_name(&Name { text: name.to_string(), span: Span::default() });
         let all = self
             .declaring(name)
             .filter(|(_, id)| id.map_or_else(|| fits(&unread()), |id| fits(&self.decl(id).item.kind)));
@@ -53,7 +53,7 @@ impl Names<'_> {
 }
 
 /// The correction that adds all of these imports of one file.
-fn fix(all: &[&Missing]) -> Fix {
+pub(super) fn fix(all: &[&Missing]) -> Fix {
     let mut modules: BTreeMap<&str, Vec<&Missing>> = BTreeMap::new();
     for missing in all {
         modules.entry(&missing.module).or_default().push(missing);

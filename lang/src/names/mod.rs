@@ -1,6 +1,7 @@
 //! Modules, declarations and scopes: which item a name stands for.
 
 pub mod imports;
+mod kin;
 mod mentioned;
 
 use std::collections::BTreeMap;
@@ -245,7 +246,10 @@ impl<'a> Names<'a> {
         if let Some(other) = self.declared_in(&name.text) {
             return d.help(format!("`{}` is declared in `{other}`", name.text));
         }
-        let near = near::nearest(&name.text, self.own[module].keys());
+        let near = kin::near_species(&name.text, self.own[module].keys().map(|name| &**name));
+        if let Some(kin) = kin::in_module(&name.text, from) {
+            return near::proposed(d, &[kin], name.span);
+        }
         d = near::proposed(d, &near, name.span);
         d
     }
@@ -353,13 +357,14 @@ impl<'a> Names<'a> {
     /// A name that nothing visible has, with suggestions among what `fits`.
     pub fn unknown(&self, module: usize, name: &Name, what: &str, fits: impl Fn(&ItemKind) -> bool) -> Diagnostic {
         let candidates = self.visible(module).filter(|(_, id)| fits(&self.decl(*id).item.kind)).map(|(n, _)| n);
-        let near = near::nearest(&name.text, candidates);
-        let mut d = near::unknown(name, format!("unknown {what} `{}`", name.text), "not declared");
+        let d = near::unknown(name, format!("unknown {what} `{}`", name.text), "not declared");
         if let Some(import) = self.import_of(module, &name.text, &fits) {
-            d = import.offered(d);
-        } else {
-            d = near::proposed(d, &near, name.span);
+            return import.offered(d);
         }
-        d
+        if !fits(&kin::of_name(name)) {
+            return near::proposed(d, &near::nearest(&name.text, candidates), name.span);
+        }
+        let near = kin::near_species(&name.text, candidates);
+        self.with_kin(module, name, d).unwrap_or_else(|d| near::proposed(*d, &near, name.span))
     }
 }

@@ -7,7 +7,14 @@ use std::collections::BTreeMap;
 
 use matterix_ir::{FileId, Span};
 
-use crate::ast::{Expr, ExprKind, Field, FieldValue, File, Item, ItemKind, Term};
+mod equilibria;
+mod kin;
+mod source;
+
+pub use self::equilibria::{Constant, Kind, Part};
+pub use self::source::Source;
+use self::source::{explained, tagged, told};
+use crate::ast::{Expr, ExprKind, Field, FieldValue, File, Item, ItemKind};
 use crate::chem::{Formula, Structure};
 use crate::{library, near, syntax};
 
@@ -18,17 +25,6 @@ struct Text {
     text: String,
     tree: File,
     is_file: bool,
-}
-
-/// Where a number comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Source {
-    /// `crc`; none where the documentation of the species tells it.
-    pub tag: Option<String>,
-    /// In full, as the module or the species tells it.
-    pub text: String,
-    /// What is said of this number: `within 4 %`, `alone`.
-    pub remark: String,
 }
 
 /// A property as stated.
@@ -42,17 +38,6 @@ pub struct Stated {
     pub source: Option<Source>,
     /// Whether it holds a number, which should have a source.
     pub is_number: bool,
-}
-
-/// An equilibrium in which a substance takes part.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Part {
-    /// Its name.
-    pub name: String,
-    /// As written: `acetic_acid <-> H+ + acetate`.
-    pub equation: String,
-    /// Its module, or file.
-    pub module: String,
 }
 
 /// A substance with all that is known of it.
@@ -80,7 +65,9 @@ pub struct Substance {
     pub smiles: Option<String>,
     /// Its properties, in order.
     pub stated: Vec<Stated>,
-    /// The equilibria in which it takes part.
+    /// What it splits into in water, as `dissolves` names it.
+    pub ions: Vec<String>,
+    /// The equilibria in which it or one of its ions takes part, by kind.
     pub equilibria: Vec<Part>,
 }
 
@@ -118,7 +105,7 @@ impl Catalogue {
         let texts: Vec<Text> = own.chain(library).collect();
         let everywhere = prelude(&texts);
         let mut all: Vec<Substance> = texts.iter().flat_map(|text| of_text(text, &everywhere)).collect();
-        take_part(&texts, &mut all);
+        equilibria::take_part(&texts, &mut all);
         Catalogue { all }
     }
 
@@ -130,7 +117,6 @@ impl Catalogue {
     /// What a word means: a name or alias, a CAS number, a name in other letters or as its documentation or synonyms have it, a formula, a
     /// structure; the first of these under which there is something, then the others.
     pub fn find(&self, word: &str) -> Vec<Found<'_>> {
-        let plain = plain(word);
         let formula = Formula::parse(word).ok();
         let structure = Structure::parse(word).ok();
         let by = |by, fits: &dyn Fn(&Substance) -> bool| Found {
@@ -142,8 +128,9 @@ impl Catalogue {
         let mut found = vec![
             by("name", &|s| s.names().any(|name| name == word)),
             by("CAS number", &|s| s.cas.as_deref() == Some(word)),
-            by("name", &|s| !exact && s.words().any(|name| self::plain(name) == plain)),
+            by("name", &|s| !exact && s.is_called(word)),
             by("formula", &|s| formula.is_some() && s.composition() == formula),
+            by("formula without its water", &|s| formula.is_some() && s.without_water() == formula),
             by("structure", &|s| structure.as_ref().is_some_and(|asked| s.is(asked))),
         ];
         let mut told: Vec<&str> = Vec::new();
@@ -153,6 +140,11 @@ impl Catalogue {
         }
         found.retain(|group| !group.substances.is_empty());
         found
+    }
+
+    /// Those that a word names in other letters, by their documentation or by a synonym.
+    pub fn called(&self, word: &str) -> Vec<&Substance> {
+        self.all.iter().filter(|s| s.is_called(word)).collect()
     }
 
     /// The names that are nearest to a word, at most three.
@@ -172,10 +164,25 @@ impl Substance {
         self.names().chain([self.title()]).chain(self.synonyms.iter().map(String::as_str))
     }
 
+    /// Whether a word is a name of it in other letters. An ion is not called by the formula of a salt: `FeSO4` is no other writing of
+    /// `FeSO4+`.
+    fn is_called(&self, word: &str) -> bool {
+        let plain = plain(word);
+        let charge = |name: &str| Formula::parse(name).ok().map(|formula| formula.charge);
+        let is_other = |name: &str| matches!((charge(name), charge(word)), (Some(a), Some(b)) if a != b);
+        self.words().any(|name| self::plain(name) == plain && !is_other(name))
+    }
+
     /// The first sentence of its documentation, without the stop: `Propanone`.
     pub fn title(&self) -> &str {
         let line = self.about.split(". ").next().unwrap_or_default();
         line.trim_end_matches('.')
+    }
+
+    /// Whether it is a solid that splits into ions as it dissolves.
+    fn is_solid_salt(&self) -> bool {
+        let is_solid = |stated: &Stated| stated.property == "phase" && stated.value.trim_matches('"') == "solid";
+        !self.ions.is_empty() && self.stated.iter().any(is_solid)
     }
 
     fn composition(&self) -> Option<Formula> {
@@ -253,6 +260,7 @@ fn substance(
         cas: written("cas"),
         smiles: written("smiles"),
         stated: stated.map(|f| one(text, f, &about, sources)).collect(),
+        ions: ions(field(fields, "dissolves")),
         equilibria: Vec::new(),
         about,
     }
@@ -273,6 +281,12 @@ fn texts(value: Option<&FieldValue>) -> Vec<String> {
     items.iter().filter_map(text).collect()
 }
 
+/// The species of `dissolves`.
+fn ions(value: Option<&FieldValue>) -> Vec<String> {
+    let Some(FieldValue::Species(terms)) = value else { return Vec::new() };
+    terms.iter().map(|term| term.species.text.clone()).collect()
+}
+
 fn one(text: &Text, field: &Field, about: &str, sources: &BTreeMap<String, String>) -> Stated {
     let property = field.key.text.clone();
     let whole = part(&text.text, field.span);
@@ -286,74 +300,6 @@ fn one(text: &Text, field: &Field, about: &str, sources: &BTreeMap<String, Strin
 
 fn part(text: &str, span: Span) -> &str {
     text.get(span.start as usize..span.end as usize).unwrap_or_default()
-}
-
-/// The source in the comment at the end of the line on which something ends.
-fn tagged(text: &str, span: Span, sources: &BTreeMap<String, String>) -> Option<Source> {
-    let line = text.get(span.end as usize..)?.lines().next()?;
-    let (_, comment) = line.split_once("//")?;
-    let (tag, remark) = comment.trim().strip_prefix('[')?.split_once(']')?;
-    let full = sources.get(tag)?.clone();
-    Some(Source { tag: Some(tag.to_string()), text: full, remark: remark.trim().to_string() })
-}
-
-/// The source of a number that the documentation of its species tells: after the name of the property, after `Source:`, or as a tag.
-fn told(property: &str, about: &str, sources: &BTreeMap<String, String>) -> Option<Source> {
-    let mut words = property.replace('_', " ");
-    words.get_mut(..1)?.make_ascii_uppercase();
-    let after = |start: &str| about.split_once(&format!("{start}: ")).map(|(_, rest)| rest.to_string());
-    let tag = || {
-        let (tag, _) = about.split_once('[')?.1.split_once(']')?;
-        Some((tag.to_string(), sources.get(tag)?.clone()))
-    };
-    match after(&words).or_else(|| after("Source")) {
-        Some(text) => Some(Source { tag: None, text, remark: String::new() }),
-        None => tag().map(|(tag, text)| Source { tag: Some(tag), text, remark: String::new() }),
-    }
-}
-
-/// What the documentation of a module says of tags: ``- `[crc]` CRC Handbook``, with the lines indented below.
-fn explained(docs: &[String]) -> BTreeMap<String, String> {
-    let mut out: BTreeMap<String, String> = BTreeMap::new();
-    let mut last: Option<String> = None;
-    for line in docs {
-        let begun = line.strip_prefix("- `[").and_then(|rest| rest.split_once("]`"));
-        match (begun, &last) {
-            (Some((tag, text)), _) => {
-                out.insert(tag.to_string(), text.trim().to_string());
-                last = Some(tag.to_string());
-            }
-            (None, Some(tag)) if line.starts_with("  ") => {
-                if let Some(text) = out.get_mut(tag) {
-                    text.push(' ');
-                    text.push_str(line.trim());
-                }
-            }
-            _ => last = None,
-        }
-    }
-    out
-}
-
-/// Adds to each substance the equilibria in which it takes part.
-fn take_part(texts: &[Text], all: &mut [Substance]) {
-    for text in texts {
-        for item in &text.tree.items {
-            let ItemKind::Equilibrium { name, reactants, products, .. } = &item.kind else { continue };
-            let (Some(first), Some(last)) = (reactants.first(), products.last()) else { continue };
-            let equation = part(&text.text, Span { end: last.span.end, ..first.span }).to_string();
-            let said = Part { name: name.text.clone(), equation, module: text.module.clone() };
-            let takes = |term: &Term, s: &Substance| s.names().any(|name| name == bare(&term.species.text));
-            for s in all.iter_mut().filter(|s| reactants.iter().chain(products).any(|term| takes(term, s))) {
-                s.equilibria.push(said.clone());
-            }
-        }
-    }
-}
-
-/// A species without the phase that an equation states.
-fn bare(name: &str) -> &str {
-    crate::chem::Phase::split(name).0
 }
 
 #[cfg(test)]
