@@ -482,3 +482,28 @@ workflow look in bench {
     let page = matterixc_in(&dir, &["explain", "buffer_exhausted"]).out;
     assert!(page.contains("`std::solutions` declares this name"), "{page}");
 }
+
+#[test]
+fn a_potential_needs_both_forms_of_a_half_cell() {
+    let dir = folder("open_potential");
+    let said = |held: &str| {
+        let text = format!(
+            "mtx 1\nuse std::half_cells\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n    cup = Beaker250mL at (0, 0, 0) m holding 100 g of water + {held}\n}}\nworkflow go in bench {{\n    note \"{{redox_potential(cup.contents)}}\"\n}}\n"
+        );
+        write(&dir, "cup.mtx", text);
+        flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out)
+    };
+    for held in ["1 mmol of KMnO4 + 10 mmol of HCl", "1 mmol of Fe2+ + 2 mmol of Cl- + 10 mmol of HCl"] {
+        assert!(said(held).contains("holds only one form of each of its half-cells"), "{held}: {}", said(held));
+    }
+    for held in [
+        "1 mmol of Fe2+ + 1 mmol of Fe3+ + 5 mmol of Cl- + 20 mmol of HCl",
+        "1 mmol of Cu2+ + 2 mmol of Cl- + 1 mmol of Cu(s)",
+    ] {
+        assert!(!said(held).contains("only one form"), "{held}: {}", said(held));
+    }
+    let neutral = said("1 mmol of KMnO4 + 10 mmol of KI");
+    assert!(neutral.contains("where it becomes manganese dioxide"), "{neutral}");
+    let acid = said("1 mmol of KMnO4 + 10 mmol of KI + 20 mmol of HCl");
+    assert!(!acid.contains("dioxide"), "{acid}");
+}
