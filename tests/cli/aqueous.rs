@@ -503,7 +503,7 @@ fn a_potential_needs_both_forms_of_a_half_cell() {
         assert!(!said(held).contains("only one form"), "{held}: {}", said(held));
     }
     let neutral = said("1 mmol of KMnO4 + 10 mmol of KI");
-    assert!(neutral.contains("where it becomes manganese dioxide"), "{neutral}");
+    assert!(neutral.contains("and becomes manganese dioxide"), "{neutral}");
     let acid = said("1 mmol of KMnO4 + 10 mmol of KI + 20 mmol of HCl");
     assert!(!acid.contains("dioxide"), "{acid}");
 }
