@@ -471,7 +471,10 @@ fn weak_acids_free_hydrogen_cyanide() {
         let found = poured_with("cyanide_acids", uses, cyanide, &format!("20 g of water + {acid}"));
         let errors: Vec<_> = found.iter().filter(|f| f.1 == "error").collect();
         assert_eq!(errors.len(), 1, "{uses} {acid}: {found:?}");
-        assert_eq!((errors[0].0.as_str(), errors[0].2.ends_with("toxic gas and flammable gas")), ("incompatible-mix", true));
+        assert_eq!(
+            (errors[0].0.as_str(), errors[0].2.ends_with("toxic gas and flammable gas")),
+            ("incompatible-mix", true)
+        );
     }
     let told = |name: &str, into: &str| {
         let found = poured_with(name, "use std::equilibria", cyanide, &format!("20 g of water + {into}"));
