@@ -254,6 +254,15 @@ def liquid_densities(of, cas, mass, temperature):
     return {source: value for source, value in out.items() if value and value > 0.3}
 
 
+def volume_boiling(of, known, given):
+    """Molar volume in mL/mol of a gas as a liquid at its boiling point."""
+    name, cas, formula = known[:3]
+    if (name, "boiling_point") not in given:
+        return None
+    density = liquid_densities(of, cas, mass_of(formula), float(given[name, "boiling_point"][2])).get("per")
+    return mass_of(formula) / density if density else None
+
+
 def liquid_capacities(of, cas, names, mass):
     """Heat capacities of the liquid at 25 degC in J/(mol*K)."""
     out = {"crc": number(of.thermo.get(cas, {}), "Cpl"), "pol": number(of.poling.get(cas, {}), "Cpl")}
@@ -363,7 +372,8 @@ def candidates(of, substance, known):
         out["heat_capacity"], out["solid_density"] = capacity, solid
     if phase == "gas":
         row = obigt(of, "aq", names)
-        if row and number(row, "Cp") and number(row, "V"):
+        # A volume of 0 there is one that is not known.
+        if row and number(row, "Cp"):
             out["dissolved"] = number(row, "V"), number(row, "Cp") * (4.184 if row["E_units"] == "cal" else 1), row["ref1"]
     row = of.aqsol.get(key)
     if row and int(row["Occurrences"]) >= 2 and float(row["SD"]) <= 0.15:
@@ -562,7 +572,8 @@ def main():
                 got = choose_density(by)
                 by = {**by["25"], "crc": by["crc"], "cas": by["cas"]}
             elif what == "dissolved":
-                values.append([s["name"], "molar_volume", f"{by[0]:.4g}", "aq", "", "", by[2]])
+                if by[0]:
+                    values.append([s["name"], "molar_volume", f"{by[0]:.4g}", "aq", "", "", by[2]])
                 values.append([s["name"], "heat_capacity", f"{by[1]:.4g}", "aq", "", "", by[2]])
                 continue
             elif what == "solubility":
@@ -624,6 +635,13 @@ def main():
     goodness.append(["gir", len(sure), f"{denser:.3f}", f"{half:.4f}", f"{most:.4f}"])
     lacking = [n for n in crystals if (n, "density") not in given]
     values += [[n, "density", f"{denser * by_atoms(*crystals[n]):.3g}", "gir", "", "", ""] for n in lacking]
+    boiled = {k[0]: volume_boiling(of, k, given) for k in kept if k[5] == "gas"}
+    sure = [float(given[n, "molar_volume"][2]) / v for n, v in boiled.items() if v and (n, "molar_volume") in given]
+    smaller = statistics.median(sure)
+    half, most = numpy.quantile([abs(smaller / r - 1) for r in sure], (0.5, 0.9))
+    goodness.append(["liq", len(sure), f"{smaller:.3f}", f"{half:.4f}", f"{most:.4f}"])
+    lacking = [n for n, v in boiled.items() if v and (n, "heat_capacity") in given and (n, "molar_volume") not in given]
+    values += [[n, "molar_volume", f"{smaller * boiled[n]:.3g}", "liq", "", "", ""] for n in lacking]
     values += [[n, "heat_capacity", f"{value:.3g}", "fit", "", "", ""] for n, value in found.items()]
     write(HERE / "identifiers.csv", "name cas formula smiles inchikey phase".split(), kept)
     write(HERE / "estimates.csv", "tag known factor half nine_tenths".split(), goodness)

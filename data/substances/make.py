@@ -1,4 +1,4 @@
-"""Writes stdlib/substances.mtx from list.csv, identifiers.csv and values.csv beside it; refuses what does not agree.
+"""Writes stdlib/substances.mtx from list.csv, identifiers.csv, values.csv and water.csv beside it; refuses what does not agree.
 
     python3 data/substances/make.py            # writes the module, and `cas` into stdlib/species.mtx
     python3 data/substances/make.py --check    # says whether both are as it would write them
@@ -40,12 +40,6 @@ HAZARDS = {
 }
 
 
-# Solids that have H260, H261 or EUH014 in Regulation (EC) 1272/2008: they react with water, and do not dissolve.
-REACTS = {
-    "Li", "K", "Ca", "lithium_aluminium_hydride", "lithium_hydride", "calcium_hydride", "potassium_hydride", "CaC2", "phosphorus_pentachloride",
-}
-
-
 def rows(name):
     with open(HERE / name, encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
@@ -75,6 +69,12 @@ def atoms(formula):
     return out
 
 
+def shares(formula):
+    """The atoms of a formula in the least whole numbers: P4O10 and P2O5 are one."""
+    counts = atoms(formula)
+    return {element: count // math.gcd(*counts.values()) for element, count in counts.items()}
+
+
 def kopp(formula):
     return sum(KOPP.get(element, KOPP_OTHER) * count for element, count in atoms(formula).items())
 
@@ -96,7 +96,7 @@ class Row:
         self.what, self.value, self.source, self.second = what, value, source, second
 
     def remark(self):
-        if self.source in ("kopp", "fit", "gir", "aq", "aqs", "aqd", "aqa"):
+        if self.source in ("kopp", "fit", "gir", "aq", "aqs", "aqd", "aqa", "liq"):
             return ""
         if self.second is None:
             return " alone"
@@ -151,9 +151,11 @@ def substances():
     for row in rows("values.csv"):
         second = float(row["second"]) if row["second"] else None
         values.setdefault(row["name"], {})[row["property"]] = Row(row["property"], float(row["value"]), row["source"], second)
+    water = {row["name"]: row for row in rows("water.csv")}
     taken = set(re.findall(r"^species (\S+) ", SPECIES.read_text(encoding="utf-8"), re.M))
     explained = (HERE / "head.mtx").read_text(encoding="utf-8")
     weigh, wrong, seen, out, dropped = masses(), [], {}, [], []
+    wrong += [f"{name}: is in water.csv and not in list.csv" for name in water.keys() - {row["name"] for row in listed}]
     for row in listed:
         name, ids, by = row["name"], known.get(row["name"]), values.get(row["name"], {})
         if ids is None:
@@ -166,6 +168,12 @@ def substances():
         if ids["phase"] == "solid" and "heat_capacity" not in by:
             by["heat_capacity"] = Row("heat_capacity", float(f"{kopp(ids['formula']):.3g}"), "kopp")
         say = lambda text: wrong.append(f"{name}: {text}")
+        if re.search(r"[+-]$", ids["formula"]):
+            say(f"its formula has a charge: {ids['formula']}")
+        for word in [name, *row["aliases"].split()]:
+            # A name such as `Fe3O4` is a formula.
+            if re.fullmatch(r"(?:[A-Z][a-z]?\d*)*\d(?:[A-Z][a-z]?\d*)*", word) and set(atoms(word)) <= set(weigh) and shares(word) != shares(ids["formula"]):
+                say(f"`{word}` is not its formula: {ids['formula']}")
         for text in faults_of(ids, by, mass):
             say(text)
         for stated in by.values():
@@ -187,7 +195,7 @@ def substances():
             say("a gas under pressure")
         if "flash_point" in by and by["flash_point"].value < 333 and "F" not in row["hazards"]:
             say(f"flashes at {by['flash_point'].value - 273.15:.0f} degC and is not said to be flammable")
-        out.append((row, ids, by))
+        out.append((row, ids, by, water.get(name)))
     return out, dropped, wrong
 
 
@@ -203,7 +211,7 @@ def usual(row, formula):
     return formula
 
 
-def entry(row, ids, by):
+def entry(row, ids, by, water):
     """The text of a substance with its other names."""
     out = f"/// {row['title']}.\nspecies {row['name']} {{\n"
     if ids["smiles"]:
@@ -211,8 +219,10 @@ def entry(row, ids, by):
         out += f'    smiles: "{smiles}"\n'
     out += f'    formula: "{usual(row, ids["formula"])}"\n    cas: "{row["cas"]}"\n    phase: "{ids["phase"]}"\n'
     out += "".join(by[what].line() for what in ORDER if what in by)
-    if row["name"] in REACTS:
+    if water:
         out += "    reacts_with_water: true\n"
+    if water and water["makes"]:
+        out += f'    makes_with_water: "{water["makes"]}"\n'
     if row["groups"]:
         out += f"    reactive_groups: [{row['groups'].replace(' ', ', ')}]\n"
     if row["hazards"]:
@@ -231,12 +241,13 @@ def head(out):
     good = {row["tag"]: row for row in rows("estimates.csv")}
     errors = sorted(
         abs(kopp(ids["formula"]) / by["heat_capacity"].value - 1)
-        for _, ids, by in out
+        for _, ids, by, _ in out
         if ids["phase"] == "solid" and {"C", "H"} <= set(atoms(ids["formula"])) and by["heat_capacity"].source != "kopp"
     )
     fills = {
         "FITTED_ERROR": percent(float(good["fit"]["nine_tenths"])), "FITTED_HALF": percent(float(good["fit"]["half"])),
         "FITTED": good["fit"]["known"], "DENSER_ERROR": percent(float(good["gir"]["nine_tenths"])),
+        "SMALLER_ERROR": percent(float(good["liq"]["nine_tenths"])), "SMALLER": f"{float(good['liq']['factor']):.2g}", "BOILED": good["liq"]["known"],
         "DENSER": f"{float(good['gir']['factor']):.3g}", "KNOWN": good["gir"]["known"], "KOPPED": str(len(errors)),
         "KOPP_ERROR": percent(errors[math.ceil(0.9 * len(errors)) - 1]),
         "TYPED": str(sum(1 for row in rows("list.csv") if row["formula"])),
@@ -248,11 +259,11 @@ def head(out):
 def module(out):
     """The text of the module."""
     text, section = head(out), None
-    for row, ids, by in out:
+    for row, ids, by, water in out:
         if row["section"] != section:
             section = row["section"]
             text += f"\n// ---- {section}\n"
-        text += "\n" + entry(row, ids, by)
+        text += "\n" + entry(row, ids, by, water)
     return text
 
 

@@ -507,3 +507,47 @@ fn a_potential_needs_both_forms_of_a_half_cell() {
     let acid = said("1 mmol of KMnO4 + 10 mmol of KI + 20 mmol of HCl");
     assert!(!acid.contains("dioxide"), "{acid}");
 }
+
+#[test]
+fn a_ph_says_what_water_would_make_of_an_oxide() {
+    let ph = "    note \"{cup.contents.ph}\"";
+    let of = |name: &str, uses: &str, what: &str, then: &str| {
+        poured(name, uses, "50 g of water", &format!("50 g of water + {what}"), then)
+    };
+    let tables = "use std::substances\n";
+    let both = "use std::substances\nuse std::equilibria\n";
+    for (what, makes) in [
+        ("SO2", "ignores that SO2 makes sulfurous_acid of std::equilibria with water"),
+        ("CaO", "ignores that CaO makes calcium_hydroxide with water"),
+        ("BaO", "makes Ba2+ and OH- with water"),
+        ("Li2O", "makes Li+ and OH- with water"),
+        ("P4O10", "makes H3PO4 with water"),
+        ("CrO3", "makes H+ and hydrogen_chromate of std::equilibria with water"),
+        ("B2O3", "makes boric_acid of std::equilibria with water"),
+        ("Ac2O", "makes acetic_acid with water"),
+        ("PCl5", "makes HCl and H3PO4 with water"),
+        ("TiCl4", "makes HCl and TiO2 with water"),
+        ("Cl2", "makes HCl and hypochlorous_acid of std::acids with water"),
+        ("acetyl_chloride", "makes HCl and acetic_acid with water"),
+    ] {
+        for uses in [tables, both] {
+            let said = of("oxide", uses, &format!("1 mmol of {what}"), ph);
+            assert!(said.contains(makes) && !said.contains("missing-property"), "{what}: {said}");
+        }
+    }
+    let caution = "with water";
+    for (name, uses, what, then) in [
+        // No pH is used; water leaves it alone; too little of it; what it makes is written.
+        ("oxide_no_ph", both, "1 mmol of CaO", ""),
+        ("oxide_inert", both, "1 mmol of SiO2", ph),
+        ("oxide_little", both, "1 mmol of HCl + 1 umol of CaO", ph),
+        ("oxide_products", both, "1 mmol of sulfurous_acid", ph),
+    ] {
+        let said = of(name, uses, what, then);
+        assert!(!said.contains(caution), "{name}: {said}");
+    }
+    let reaction =
+        format!("{both}reaction slaking: CaO + water -> calcium_hydroxide {{ rate: 1e-3 1/s, order: {{ CaO: 1 }} }}\n");
+    let said = of("oxide_reacts", &reaction, "1 mmol of CaO", ph);
+    assert!(!said.contains(caution) && !said.contains("error"), "{said}");
+}

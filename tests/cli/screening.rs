@@ -348,3 +348,142 @@ fn what_is_declared_wrongly_is_said_where_it_stands() {
     assert_eq!(wrong("when", "hazard h(p: Heater) when p.targt > 3 degC"), of("unknown-member"));
     assert_eq!(wrong("twice", "material glass {}\nmaterial glass {}"), of("duplicate-name"));
 }
+
+/// A bench whose vessels hold what `use` lines bring.
+fn poured_with(name: &str, uses: &str, target: &str, source: &str) -> Vec<(String, String, String)> {
+    let pour = "pour 5 g from b into waste by arm using scale { tolerance: 1 g }";
+    let text = bench(&holding(target), &holding(source), "", pour).replace("mtx 1\n", &format!("mtx 1\n{uses}\n"));
+    findings(name, &text).into_iter().map(|f| (f.0, f.1, f.3)).collect()
+}
+
+/// Whether the screen says this of what is poured together, and nothing graver.
+fn comes_of(name: &str, uses: &str, target: &str, source: &str) -> Option<String> {
+    let found = poured_with(name, uses, target, source);
+    let mut mixes = found.into_iter().filter(|f| f.0 == "incompatible-mix" || f.1 == "error");
+    let first = mixes.next();
+    assert_eq!(mixes.next(), None, "{name}: one mistake, one message");
+    first.map(|f| f.2.rsplit(": ").next().unwrap_or_default().to_string())
+}
+
+const TABLES: &str = "use std::substances\nuse std::equilibria";
+
+#[test]
+fn metals_hydrides_and_halides_are_screened() {
+    let (acid, base, water) = ("50 g of water + 5 g of HCl", "50 g of water + 5 g of NaOH", "50 g of water");
+    let hydrogen = "flammable gas and heat";
+    let oxides = "toxic gas and heat";
+    let violent = "toxic gas, a violent reaction and heat";
+    let burns = "fire, flammable gas and heat";
+    for (target, source, expected) in [
+        (acid, "10 g of Zn", Some(hydrogen)),
+        (acid, "10 g of Mg", Some(hydrogen)),
+        (acid, "10 g of Fe", Some(hydrogen)),
+        (acid, "10 g of Al", Some(hydrogen)),
+        (base, "10 g of Al", Some(hydrogen)),
+        (base, "10 g of Zn", Some(hydrogen)),
+        ("50 g of water + 5 g of acetic_acid", "10 g of Mg", Some("flammable gas")),
+        ("50 g of water + 5 g of HNO3", "10 g of Cu", Some(oxides)),
+        ("50 g of water + 20 g of HNO3", "10 g of Ag", Some(oxides)),
+        (water, "10 g of PCl5", Some(violent)),
+        (water, "10 g of TiCl4", Some(violent)),
+        (water, "10 g of TMSCl", Some(violent)),
+        (water, "10 g of P4O10", Some("a violent reaction and heat")),
+        (water, "10 g of LiAlH4", Some(burns)),
+        (water, "10 g of CaH2", Some(burns)),
+        (water, "10 g of CaC2", Some(burns)),
+        (water, "10 g of AlMe3", Some(burns)),
+        // Their twins.
+        (acid, "10 g of Cu", None),
+        (acid, "10 g of Ag", None),
+        (acid, "20 g of water + 10 mmol of Zn2+ + 20 mmol of Cl-", None),
+        (acid, "20 g of water + 10 mmol of Mg2+ + 20 mmol of Cl-", None),
+        (base, "10 g of Fe", None),
+        (base, "10 g of Cu", None),
+        (water, "10 g of Fe", None),
+        (water, "10 g of Zn", None),
+        (water, "10 g of Al", None),
+        ("50 g of water + 1 mg of HCl", "10 g of Fe", None),
+        ("50 g of water + 5 g of HNO3", "20 g of water + 1 g of CuSO4", None),
+        ("50 g of water + 20 g of HNO3", "10 g of Au", None),
+        ("50 g of toluene", "10 g of TMSCl", None),
+    ] {
+        let found = comes_of("metals", TABLES, target, source);
+        assert_eq!(found.as_deref(), expected, "{source} into {target}");
+    }
+}
+
+#[test]
+fn oxidisers_nitrites_and_ammonium_are_screened() {
+    let bleach = "50 g of water + 3 g of NaOCl";
+    let permanganate = "20 g of water + 0.5 g of KMnO4";
+    let chlorine = Some("`waste` holds permanganate, chloride and a strong acid");
+    for (target, source, expected) in [
+        (bleach, "20 g of water + 2 g of NH4Cl", Some("toxic gas")),
+        (bleach, "20 g of water + 20 mmol of NH4+ + 20 mmol of Cl-", Some("toxic gas")),
+        (bleach, "20 g of water + 20 mmol of HSO4- + 20 mmol of Na+", Some("toxic gas")),
+        ("50 g of water + 20 g of HCl", permanganate, Some("toxic gas")),
+        ("50 g of H2SO4", "10 g of KMnO4", Some("an explosion, fire and heat")),
+        ("50 g of water + 20 g of H2O2", permanganate, Some("a violent reaction, heat and gas")),
+        ("50 g of water + 20 g of H2O2", "10 g of MnO2", Some("a violent reaction, heat and gas")),
+        ("50 g of water + 20 g of sodium_nitrite", "10 g of water + 3 g of NH4Cl", Some("heat and gas")),
+        ("50 g of water + 10 g of sodium_nitrite", "10 g of water + 1 g of HCl", Some("toxic gas")),
+        // Their twins.
+        (bleach, "20 g of water + 1 g of NaCl", None),
+        ("50 g of water + 2 g of NaCl", "20 g of water + 2 g of NH4Cl", None),
+        ("50 g of water + 2 g of NaCl", permanganate, None),
+        ("50 g of water", permanganate, None),
+        ("50 g of water", "10 g of water + 3 g of H2O2", None),
+        ("50 g of water + 1 g of H2O2", "20 g of water + 0.05 g of KMnO4", None),
+        ("50 g of water + 1 g of sodium_nitrite", "10 g of water + 0.1 g of NH4Cl", None),
+        ("50 g of water + 1 g of KNO3", "20 g of water + 2 g of NH4Cl", None),
+    ] {
+        let found = comes_of("oxidisers", TABLES, target, source);
+        assert_eq!(found.as_deref(), expected, "{source} into {target}");
+    }
+    // The screen knows pairs; chlorine takes three.
+    let three = |target: &str| poured_with("chlorine", TABLES, target, "20 g of water + 0.9 g of KMnO4");
+    let says = |found: &[(String, String, String)]| {
+        found.iter().any(|f| f.1 == "error" && chlorine.is_some_and(|words| f.2.starts_with(words)))
+    };
+    let chloride = three("20 g of water + 10 g of H2SO4 + 5 g of NaCl");
+    assert!(says(&chloride), "{chloride:?}");
+    let sulfate = three("20 g of water + 10 g of H2SO4");
+    assert!(!sulfate.iter().any(|f| f.1 == "error"), "{sulfate:?}");
+}
+
+#[test]
+fn chloroform_and_acetone_are_told_with_a_base() {
+    let found = poured_with("chloroform", "", "30 g of acetone + 2 g of water + 2 g of KOH", "30 g of CHCl3");
+    assert!(found.iter().any(|f| f.1 == "error" && f.2.contains("chloroform, acetone and a strong base")), "{found:?}");
+    assert_eq!(poured_with("no_base", "", "30 g of acetone", "30 g of CHCl3"), []);
+}
+
+#[test]
+fn weak_acids_free_hydrogen_cyanide() {
+    let cyanide = "50 g of water + 5 mmol of NaCN";
+    let acids = [
+        "20 mmol of H2PO4- + 20 mmol of Na+",
+        "20 mmol of NH4Cl",
+        "20 mmol of NaHCO3",
+        "20 mmol of Fe3+ + 60 mmol of Cl-",
+    ];
+    for (uses, acid) in ["", "use std::equilibria"].iter().flat_map(|uses| acids.iter().map(move |acid| (uses, acid))) {
+        let found = poured_with("cyanide_acids", uses, cyanide, &format!("20 g of water + {acid}"));
+        let errors: Vec<_> = found.iter().filter(|f| f.1 == "error").collect();
+        assert_eq!(errors.len(), 1, "{uses} {acid}: {found:?}");
+        assert_eq!(
+            (errors[0].0.as_str(), errors[0].2.ends_with("toxic gas and flammable gas")),
+            ("incompatible-mix", true)
+        );
+    }
+    let told = |name: &str, into: &str| {
+        let found = poured_with(name, "use std::equilibria", cyanide, &format!("20 g of water + {into}"));
+        found.into_iter().filter(|f| f.1 == "error").map(|f| (f.0, f.2)).collect::<Vec<_>>()
+    };
+    // An acid that the screen has no group for, by what the equilibria make of it.
+    let tris = told("cyanide_tris", "30 mmol of tris_HCl");
+    assert_eq!(tris.len(), 1, "{tris:?}");
+    assert!(tris[0].0 == "hazard" && tris[0].1.contains("of HCN, a gas that is fatal if inhaled"), "{tris:?}");
+    assert_eq!(told("cyanide_lye", "1 g of NaOH"), []);
+    assert_eq!(told("cyanide_salt", "20 mmol of NaCl"), []);
+}

@@ -162,6 +162,9 @@ impl Walk<'_, '_> {
                 continue;
             }
             let hazard = &self.hazards.all[i];
+            if self.follows(hazard) {
+                continue;
+            }
             // What is so from the start stands where the lab puts it.
             let (place, said) = match self.places.len() {
                 1 => (self.declared_at(hazard), "true from the start"),
@@ -178,6 +181,18 @@ impl Walk<'_, '_> {
             }
             self.tell(i, d);
         }
+    }
+
+    /// Whether a hazard of a mixture only follows from a pair that must not meet and that this step, or the lab, is reported to bring together
+    /// there: mending that mends it.
+    fn follows(&self, hazard: &Hazard) -> bool {
+        let place = if self.places.len() == 1 { None } else { Some(self.place()) };
+        hazard.grave
+            && self.told.iter().any(|(pair, at, i)| {
+                Some(pair.0) == hazard.about
+                    && place.is_none_or(|place| place == *at)
+                    && self.found.get(*i).is_some_and(Diagnostic::is_error)
+            })
     }
 
     /// Judges the hazards of what a step uses.
