@@ -435,7 +435,8 @@ fn oxidisers_nitrites_and_ammonium_are_screened() {
         ("50 g of water", "10 g of water + 3 g of H2O2", None),
         ("50 g of water + 1 g of H2O2", "20 g of water + 0.05 g of KMnO4", None),
         ("50 g of water + 1 g of sodium_nitrite", "10 g of water + 0.1 g of NH4Cl", None),
-        ("50 g of water + 1 g of KNO3", "20 g of water + 2 g of NH4Cl", None),
+        // Nitrates are no nitrites.
+        ("50 g of water + 15 g of KNO3", "20 g of water + 4 g of NH4Cl", None),
     ] {
         let found = comes_of("oxidisers", TABLES, target, source);
         assert_eq!(found.as_deref(), expected, "{source} into {target}");

@@ -142,7 +142,10 @@ fn a_buffer_that_gives_out_is_told() {
     let buffer = "100 g of water + 2 mmol of H2PO4- + 2 mmol of HPO4^2- + 6 mmol of Na+";
     let lye = "10 g of water + 4 mmol of NaOH";
     let gone = findings_of("buffer_gone", buffer, lye, "    deliver 2 mL by burette\n    deliver 5 mL by burette");
-    assert!(gone.contains("what is added from `burette` exhausts the buffer of H2PO4- in `cup`: its pH goes from 7"), "{gone}");
+    assert!(
+        gone.contains("what is added from `burette` exhausts the buffer of H2PO4- in `cup`: its pH goes from 7"),
+        "{gone}"
+    );
     let left = findings_of("buffer_left", buffer, lye, "    deliver 2 mL by burette\n    deliver 2 mL by burette");
     assert!(left.contains("no findings"), "{left}");
 }
