@@ -16,6 +16,9 @@ use super::{Layout, Phase, System, Written};
 const ACTIVITIES: (f64, f64) = (-150.0, 150.0);
 pub(super) const HALVINGS: [usize; 2] = [10, 18];
 
+/// Logarithms of activities one of which is taken where nothing binds the formal member, the ends first.
+const OPEN: [f64; 5] = [ACTIVITIES.0, ACTIVITIES.1, 0.0, -50.0, 50.0];
+
 /// A share of what is bound that is rounding.
 const ROUNDED: f64 = 1e-13;
 
@@ -90,6 +93,16 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
     let rest = free.system.rest.as_ref()?;
     let basis = &free.basis;
     let c = basis.masters.iter().position(|i| *i == rest.member)?;
+    let binds = |i: usize| i != rest.member && basis.of[i][c] != 0.0 && free.given(i) != 0.0;
+    if !(0..basis.of.len()).any(binds) {
+        let open = |activity: f64| {
+            let solution = solve(&rest.system, &rest.args(free, activity))?;
+            let (start, mut held) = rest.begin(free, &solution, activity)?;
+            held.push(rest.member);
+            Some(Begin::AtLimit(start, held, activity))
+        };
+        return OPEN.into_iter().find_map(open);
+    }
     let bound = |of: &dyn Fn(usize) -> f64| (0..basis.of.len()).map(|i| basis.of[i][c] * of(i)).sum::<f64>();
     let wanted = bound(&|i| free.given(i));
     // By how much more than wanted is bound of it at an activity, and how far rounding reaches.

@@ -279,6 +279,31 @@ fn a_redox_titration_passes_its_end_point() {
     near(at, (0.771 + 5.0 * 1.507) / 6.0);
 }
 
+/// Nothing takes up electrons or gives any: the potential is open, and the rest is that of the solution without half-cells.
+#[test]
+fn nothing_to_oxidise_is_no_trouble() {
+    let sketch = || {
+        Sketch::new()
+            .equation("-1 water 1 H+ 1 OH-", -13.995, 55.8)
+            .equation("-1 MnO4- -8 H+ -5 e- 1 Mn++ 4 water", 5.0 * 1.507 / 0.059_159_6, -825.0)
+            .equation("-1 Mn++ -1 water 1 MnOH+ 1 H+", -10.59, 60.25)
+            .equation("-1 Mn(OH)2(s) 1 Mn++ 2 OH-", -12.8, 0.0)
+    };
+    for (name, mixture) in [("ideal", sketch().build()), ("real", sketch().build().real())] {
+        let water = mixture.with(&[("water", WATER)]);
+        assert!((water.ph() - 6.9975).abs() < 1e-3, "{name}: {}", water.ph());
+        assert_eq!(water.amount("Mn++"), 0.0, "{name}");
+        let mut warm = sketch().build().real().with(&[("water", WATER)]);
+        let layout = warm.system.layout();
+        warm.args[layout.capacity()] = 4184.0;
+        warm.args[layout.heat()] = 0.0;
+        assert!((warm.ph() - 6.9975).abs() < 1e-3, "{name}: {}", warm.ph());
+        let acid = sketch().build().with(&[("water", WATER), ("H+", 0.1)]);
+        assert!((acid.ph() - 1.0).abs() < 0.2, "{name}: {}", acid.ph());
+    }
+    assert!((Sketch::half_cells().build().with(&[("water", WATER)]).ph() - 6.9975).abs() < 1e-3);
+}
+
 #[test]
 fn metals_plate_out_and_dissolve() {
     let mixture = Sketch::half_cells().build().with(&[("water", WATER), ("Cu++", 0.1), ("Zn(s)", 0.3)]);
