@@ -14,6 +14,7 @@ use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr};
 use crate::chem::constants::{ANALYTIC, CONSTANTS, HEAT, LOG_PARTITION, PARTITION, POTENTIAL};
 use crate::declare::species::field;
+use crate::declare::tables::ReactionDef;
 use crate::declare::{ReactionId, SpeciesId, Type};
 use crate::eval::interactions::Acting;
 use crate::eval::lab::{Elaborator, Mode};
@@ -290,14 +291,18 @@ impl<'a> Elaborator<'a> {
         Some(args.into())
     }
 
-    /// What is there of a species; where `split` with what salts, acids and bases will give of it.
+    /// What is there of a species; where `split` with what salts, acids and bases will give of it, as far as there is water: a dry hydrate keeps
+    /// its own.
     fn held(&mut self, id: InstanceId, s: SpeciesId, split: bool) -> NodeId {
         let here: Vec<(SpeciesId, u32)> = self.amounts_in(id).collect();
+        let is_water = |s: &SpeciesId| self.tables.species.get(*s).is_water;
+        let water = here.iter().find(|(s, _)| is_water(s)).map(|(_, state)| *state);
         let mut sum = self.graph.number(0.0);
+        let mut to_come = self.graph.number(0.0);
         for (other, state) in here {
             let count = match other == s {
                 true => 1.0,
-                false if split && self.splits(other) => {
+                false if split && self.splits(other) && !self.is_precipitate(other) => {
                     let ions = &self.tables.species.get(other).dissolves;
                     ions.iter().filter(|(ion, _)| *ion == s).map(|(_, n)| *n).sum()
                 }
@@ -309,9 +314,15 @@ impl<'a> Elaborator<'a> {
             let amount = self.as_put(state);
             let count = self.graph.number(count);
             let part = self.graph.binary(BinaryOp::Mul, count, amount);
-            sum = self.graph.binary(BinaryOp::Add, sum, part);
+            let of = if other == s { &mut sum } else { &mut to_come };
+            *of = self.graph.binary(BinaryOp::Add, *of, part);
         }
-        sum
+        let nothing = self.graph.number(0.0);
+        let Some(water) = water.filter(|_| to_come != nothing) else { return sum };
+        let water = self.as_put(water);
+        let is_wet = self.graph.binary(BinaryOp::Lt, nothing, water);
+        let to_come = self.graph.select(is_wet, to_come, nothing);
+        self.graph.binary(BinaryOp::Add, sum, to_come)
     }
 
     /// The ions that are in no equilibrium, with their charges.
@@ -700,6 +711,14 @@ impl<'a> Elaborator<'a> {
     pub fn splits(&self, s: SpeciesId) -> bool {
         let is_balanced = self.tables.equilibria.iter().any(|e| e.involves(s));
         !is_balanced && !self.tables.species.get(s).dissolves.is_empty()
+    }
+
+    /// Whether a reaction of the file makes a salt of all its ions: it is a solid then, and does not split.
+    fn is_precipitate(&self, s: SpeciesId) -> bool {
+        let ions = &self.tables.species.get(s).dissolves;
+        let has = |all: &[(SpeciesId, f64)], s: SpeciesId| all.iter().any(|(other, _)| *other == s);
+        let makes = |r: &ReactionDef<'_>| has(&r.products, s) && ions.iter().all(|(ion, _)| has(&r.reactants, *ion));
+        self.tables.reactions.iter().any(makes)
     }
 
     /// Whether equilibria have a species as a solid of its own.
