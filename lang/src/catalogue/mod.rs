@@ -291,7 +291,9 @@ fn one(text: &Text, field: &Field, about: &str, sources: &BTreeMap<String, Strin
     let property = field.key.text.clone();
     let whole = part(&text.text, field.span);
     let value = whole.split_once(':').map_or(whole, |(_, value)| value).trim().to_string();
-    let is_number = !WORDS.contains(&property.as_str()) && value.contains(|c: char| c.is_ascii_digit());
+    // Formulas in quotes have digits, too.
+    let is_word = WORDS.contains(&property.as_str()) || value.starts_with('"');
+    let is_number = !is_word && value.contains(|c: char| c.is_ascii_digit());
     let source = is_number
         .then(|| tagged(&text.text, field.span, sources).or_else(|| told(&property, about, sources)))
         .flatten();

@@ -28,6 +28,8 @@ fn every_field_is_described_and_every_description_has_a_field() {
     // Where an equilibrium has a species these are there too.
     let species = report.containers.iter_mut().flat_map(|c| &mut c.species).next().expect("a species");
     (species.put, species.solid) = (Some(1.0), Some(false));
+    // Where its model does not hold, a property says so.
+    report.containers.iter_mut().flat_map(|c| &mut c.properties).next().expect("a property").outside = true;
     let json: Value = serde_json::from_str(&report.json().expect("written")).expect("JSON");
     let mut present = BTreeSet::new();
     fields(&json, "", &mut present);
