@@ -93,7 +93,8 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
     let rest = free.system.rest.as_ref()?;
     let basis = &free.basis;
     let c = basis.masters.iter().position(|i| *i == rest.member)?;
-    let binds = |i: usize| i != rest.member && basis.of[i][c] != 0.0 && free.given(i) != 0.0;
+    let lacking = free.lacking();
+    let binds = |i: usize| i != rest.member && basis.of[i][c] != 0.0 && free.may_be(i, &lacking);
     if !(0..basis.of.len()).any(binds) {
         let open = |activity: f64| {
             let solution = solve(&rest.system, &rest.args(free, activity))?;

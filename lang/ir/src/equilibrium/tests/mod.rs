@@ -302,6 +302,13 @@ fn nothing_to_oxidise_is_no_trouble() {
         assert!((acid.ph() - 1.0).abs() < 0.2, "{name}: {}", acid.ph());
     }
     assert!((Sketch::half_cells().build().with(&[("water", WATER)]).ph() - 6.9975).abs() < 1e-3);
+    // What could be oxidised is there, and nothing that would do it.
+    let thiosulfate = Sketch::new()
+        .equation("-1 water 1 H+ 1 OH-", -13.995, 55.8)
+        .equation("-1 S4O6-- -2 e- 2 S2O3--", 2.0 * 0.024 / 0.059_159_6, -72.8)
+        .build()
+        .with(&[("water", WATER), ("S2O3--", 0.1)]);
+    assert!((thiosulfate.amount("S2O3--") - 0.1).abs() < 1e-9, "{}", thiosulfate.amount("S2O3--"));
 }
 
 #[test]
