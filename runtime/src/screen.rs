@@ -264,9 +264,9 @@ impl<'p> Screen<'p> {
             let now = self.conditions[index].holds(engine, &mut self.room);
             if !std::mem::replace(&mut self.there[index], now) && now {
                 let step = self.operation_at(None);
-                let found = self.danger(danger, step, |node| engine.eval(node));
                 // Of one danger a warning is enough, whatever its numbers are later.
                 if danger.severity == Severity::Error || self.warned.insert(index) {
+                    let found = self.danger(danger, step, |node| engine.eval(node));
                     self.tell(time, &danger.name, step, found);
                 }
             }
@@ -339,11 +339,8 @@ impl<'p> Screen<'p> {
             let known = |node| Ok::<_, Infallible>(Some(value(node)).filter(|v| v.is_finite()));
             said.text.show(known, name).ok()
         });
-        let mut whole = danger.about;
-        while let Some(owner) = whole.and_then(|id| instances.get(id.0 as usize)?.owner) {
-            whole = Some(owner);
-        }
-        let stands = whole.and_then(|id| instances.get(id.0 as usize)).map(|i| i.span).filter(|span| !span.is_empty());
+        let scene = &self.program.scene;
+        let stands = danger.about.map(|id| scene.get(scene.whole(id)).span).filter(|span| !span.is_empty());
         let (span, label) = match (self.place(step), stands) {
             (Some(span), _) => (span, "it happened here"),
             (None, Some(span)) => (span, "true from the start"),

@@ -1,5 +1,7 @@
 //! Findings on what solutions in water cannot hold: gas beyond its solubility, charges without a counterion, heat beyond boiling, a pH without water.
 
+use std::path::Path;
+
 use crate::harness::{flat, folder, matterixc_in, write};
 
 /// What `check` says where one beaker is poured into another.
@@ -23,8 +25,13 @@ workflow go in bench {{
 }}
 "
     );
-    write(&dir, "cup.mtx", text);
-    flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out)
+    checked(&dir, text)
+}
+
+/// What `check` says of a text.
+fn checked(dir: &Path, text: impl AsRef<[u8]>) -> String {
+    write(dir, "cup.mtx", text);
+    flat(&matterixc_in(dir, &["check", "cup.mtx", "--no-cache"]).out)
 }
 
 const EQUILIBRIA: &str = "use std::equilibria\n";
@@ -132,8 +139,7 @@ workflow look in bench {{
 }}
 "
     );
-    write(&dir, "cup.mtx", text);
-    let checked = flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out);
+    let checked = checked(&dir, text);
     (checked, flat(&matterixc_in(&dir, &["run", "cup.mtx"]).out))
 }
 
@@ -249,8 +255,7 @@ fn a_named_result_of_a_library_step_is_a_use() {
     assert!(said.contains("of `c` is used at an ionic strength of 3.00"), "{said}");
     assert!(said.contains("the activity of an ion in `brine` is used at an ionic strength of 3.00"), "{said}");
     // Nobody uses a reading that has no name.
-    write(&dir, "idle.mtx", text("    expect c.volume > 1 mL and brine.volume > 1 mL\n"));
-    let said = flat(&matterixc_in(&dir, &["check", "idle.mtx", "--no-cache"]).out);
+    let said = checked(&dir, text("    expect c.volume > 1 mL and brine.volume > 1 mL\n"));
     assert!(!said.contains("ionic strength"), "{said}");
 }
 
@@ -320,8 +325,7 @@ workflow go in bench {{
     let said = flat(&matterixc_in(&dir, &["check", "--contents", "own.mtx", "--no-cache"]).out);
     assert_eq!(said.matches("(outside its model)").count() > 0, said.contains("warm"), "{said}");
     assert!(said.lines().all(|line| !line.contains("cold:") || !line.contains("outside")), "{said}");
-    write(&dir, "own.mtx", text("3 kPa"));
-    let said = flat(&matterixc_in(&dir, &["check", "own.mtx", "--no-cache"]).out);
+    let said = checked(&dir, text("3 kPa"));
     assert!(said.contains("error"), "{said}");
 }
 
@@ -369,8 +373,7 @@ fn a_conductivity_needs_the_ions_that_equilibria_make() {
             "mtx 1\n{uses}use std::electrodes\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n{}\n}}\nworkflow go in bench {{\n    expect probe.conductivity < 1 S/m\n}}\n",
             lines(held)
         );
-        write(&dir, "probe.mtx", text);
-        flat(&matterixc_in(&dir, &["check", "probe.mtx", "--no-cache"]).out)
+        checked(&dir, text)
     };
     for held in ["1 mmol of HCl + 1 mmol of NaOH", "10 mmol of acetic_acid", "10 mmol of NH3"] {
         assert!(said("", held).contains("counts ions as they were put in"), "{held}");
@@ -386,8 +389,7 @@ fn a_window_of_ph_holds_where_there_is_a_ph() {
         let text = format!(
             "mtx 1\n{uses}use std::glassware::Beaker250mL\nasset Medium: Beaker250mL, PhWindow {{ ph_window: 6 .. 8 }}\nlab bench {{\n    ambient: 25 degC\n    cup = Medium at (0, 0, 0) m holding {held}\n}}\nworkflow go in bench {{\n    wait 1 s\n    expect cup.contents.mass > 1 g\n}}\n"
         );
-        write(&dir, "window.mtx", text);
-        flat(&matterixc_in(&dir, &["check", "window.mtx", "--no-cache"]).out)
+        checked(&dir, text)
     };
     assert!(!said(EQUILIBRIA, "10 g of ethanol").contains("window"), "no water, no pH");
     assert!(said("", "50 g of water + 1 mmol of acetic_acid").contains("counts strong acids and bases only"));
@@ -403,8 +405,7 @@ fn buffers_are_what_the_electrode_is_told() {
         let text = format!(
             "mtx 1\nuse std::equilibria\nuse std::electrodes\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n    acid = Beaker250mL at (0, 0, 0) m holding 100 g of water + 5 mmol of acetic_acid + 5 mmol of acetate + 5 mmol of Na+\n    neutral = Beaker250mL at (1, 0, 0) m holding 100 g of water + 5 mmol of H2PO4- + 5 mmol of HPO4^2- + 15 mmol of Na+\n    meter = GlassElectrode {{ probes: acid }} at (2, 0, 0) m\n}}\nworkflow go in bench {{\n    calibrate meter with (acid, neutral) at ({stated})\n    expect meter.shown > 1\n}}\n"
         );
-        write(&dir, "buffers.mtx", text);
-        flat(&matterixc_in(&dir, &["check", "buffers.mtx", "--no-cache"]).out)
+        checked(&dir, text)
     };
     assert!(said("4.66, 6.84").contains("no findings"), "{}", said("4.66, 6.84"));
     let wrong = said("5.66, 7.84");
@@ -421,8 +422,7 @@ fn things_beyond_the_third_are_named() {
     let text = format!(
         "mtx 1\nuse std::equilibria\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n{cups}}}\nworkflow go in bench {{\n    note \"{shown}\"\n}}\n"
     );
-    write(&dir, "six.mtx", text);
-    let said = flat(&matterixc_in(&dir, &["check", "six.mtx", "--no-cache"]).out);
+    let said = checked(&dir, text);
     assert_eq!(said.matches("is used at an ionic strength").count(), 3, "{said}");
     assert_eq!(said.matches("the same holds for `c3`, `c4` and `c5`").count(), 1, "{said}");
 }
@@ -451,8 +451,7 @@ workflow look in bench {
     expect cup.contents.ph in 2 .. 2.7
 }
 ";
-    write(&dir, "wrong.mtx", text);
-    let said = flat(&matterixc_in(&dir, &["check", "wrong.mtx", "--no-cache"]).out);
+    let said = checked(&dir, text);
     assert!(said.contains("unbalanced") && !said.contains("expectation-failed"), "{said}");
 }
 
@@ -490,8 +489,7 @@ fn a_potential_needs_both_forms_of_a_half_cell() {
         let text = format!(
             "mtx 1\nuse std::half_cells\nuse std::glassware::Beaker250mL\nlab bench {{\n    ambient: 25 degC\n    cup = Beaker250mL at (0, 0, 0) m holding 100 g of water + {held}\n}}\nworkflow go in bench {{\n    note \"{{redox_potential(cup.contents)}}\"\n}}\n"
         );
-        write(&dir, "cup.mtx", text);
-        flat(&matterixc_in(&dir, &["check", "cup.mtx", "--no-cache"]).out)
+        checked(&dir, text)
     };
     for held in ["1 mmol of KMnO4 + 10 mmol of HCl", "1 mmol of Fe2+ + 2 mmol of Cl- + 10 mmol of HCl"] {
         assert!(said(held).contains("holds only one form of each of its half-cells"), "{held}: {}", said(held));
@@ -582,9 +580,8 @@ workflow look in bench {
     expect epsom.contents.temperature in 24.99 degC .. 25.01 degC
 }
 ";
-    write(&dir, "dry.mtx", text);
-    let checked = flat(&matterixc_in(&dir, &["check", "dry.mtx", "--no-cache"]).out);
+    let checked = checked(&dir, text);
     assert!(!checked.contains("precipitated"), "{checked}");
-    let ran = matterixc_in(&dir, &["run", "dry.mtx"]);
+    let ran = matterixc_in(&dir, &["run", "cup.mtx"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
 }

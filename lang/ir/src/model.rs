@@ -310,6 +310,9 @@ impl Model {
     }
 }
 
+/// What stands behind a number outside the range of its model, wherever numbers are shown.
+pub const OUTSIDE: &str = " (outside its model)";
+
 /// A named quantity that follows from the state, recorded beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observable {

@@ -284,6 +284,14 @@ impl Scene {
         self.instances.iter().position(|i| i.name == name).map(|i| InstanceId(i as u32))
     }
 
+    /// What an instance is a part of, parts of parts included; itself where it is of nothing.
+    pub fn whole(&self, mut id: InstanceId) -> InstanceId {
+        while let Some(owner) = self.get(id).owner {
+            id = owner;
+        }
+        id
+    }
+
     /// Where every instance stands when the run begins.
     pub fn stands(&self) -> Vec<Stand> {
         let stand = |i: &Instance| match (i.owner, i.support) {

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use super::{Catalogue, Substance};
+use crate::chem::rational::gcd;
 use crate::chem::{Element, Formula};
 
 /// Ions with how many of each one formula has: `Na2S2O3` is 2 `Na+` and 1 `S2O3^2-`.
@@ -71,7 +72,7 @@ fn atoms(formula: &Formula) -> i64 {
 /// How many of two ions give a formula.
 fn counts(formula: &Formula, plus: &Formula, minus: &Formula) -> Option<(i64, i64)> {
     let (p, m) = (i64::from(plus.charge), i64::from(-minus.charge));
-    let shared = gcd(p, m);
+    let shared = gcd(p.into(), m.into()) as i64;
     let together = |a: i64, b: i64| {
         let is_met = |e: &Element| {
             let of = |ion: &Formula| ion.count(*e).to_f64();
@@ -81,10 +82,6 @@ fn counts(formula: &Formula, plus: &Formula, minus: &Formula) -> Option<(i64, i6
     };
     let found = (1..=UNITS).map(|n| (n * m / shared, n * p / shared)).find(|(a, b)| together(*a, *b));
     found.filter(|_| formula.charge == 0)
-}
-
-fn gcd(a: i64, b: i64) -> i64 {
-    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 #[cfg(test)]

@@ -9,6 +9,10 @@ use crate::eval::lab::Elaborator;
 
 /// Reports the first contents of each thing at the start for which equilibria have no solution.
 pub fn unsolved(lab: &mut Elaborator<'_>) {
+    // Without equilibria there is nothing to solve, and no initial value to look at.
+    if lab.tables.equilibria.is_empty() {
+        return;
+    }
     let mut looked_at: BTreeSet<NodeId> = BTreeSet::new();
     let mut found: Vec<(Span, Diagnostic)> = Vec::new();
     for (key, state) in &lab.extensive {
@@ -24,11 +28,7 @@ pub fn unsolved(lab: &mut Elaborator<'_>) {
         if !matches!(lab.graph.op(operation), Op::Solved(..)) {
             continue;
         }
-        let mut thing = key.instance;
-        while let Some(owner) = lab.instances[thing.0 as usize].owner {
-            thing = owner;
-        }
-        let whole = &lab.instances[thing.0 as usize];
+        let whole = &lab.instances[lab.outermost(key.instance).0 as usize];
         if found.iter().any(|(span, _)| *span == whole.span) {
             continue;
         }

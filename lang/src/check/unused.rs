@@ -72,7 +72,7 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
                 Argument::Instance(id) => Some(*id),
                 _ => None,
             });
-            used.extend(o.claims.iter().copied().chain(o.device).chain(arguments).map(|id| top(lab, id)));
+            used.extend(o.claims.iter().copied().chain(o.device).chain(arguments).map(|id| lab.outermost(id)));
         }
     }
     if plan.steps.iter().any(|step| matches!(&step.step, Step::Operation(o) if o.motion.is_some())) {
@@ -104,7 +104,7 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
     for i in 0..lab.instances.len() as u32 {
         let (id, inst) = (InstanceId(i), &lab.instances[i as usize]);
         let Some(origin) = inst.origin.clone() else { continue };
-        let thing = top(lab, id);
+        let thing = lab.outermost(id);
         if !own(&thing) {
             continue;
         }
@@ -209,12 +209,12 @@ fn read(lab: &Elaborator<'_>, plan: &Plan, used: &BTreeSet<InstanceId>) -> BTree
     for (id, parts) in flows.chain(rates) {
         for part in parts {
             let law = laws.entry(part.process).or_default();
-            law.0.insert(top(lab, id));
+            law.0.insert(lab.outermost(id));
             law.1.push(part.node);
         }
     }
     for (changed, nodes) in laws.into_values().filter(|(changed, _)| !changed.is_disjoint(used)) {
-        out.extend(owners_read(lab, nodes).into_iter().filter(|id| !changed.contains(&top(lab, *id))));
+        out.extend(owners_read(lab, nodes).into_iter().filter(|id| !changed.contains(&lab.outermost(*id))));
     }
     out
 }
@@ -320,22 +320,22 @@ fn bonds(lab: &Elaborator<'_>, sources: &Sources, item: &Item) -> BTreeSet<(Inst
     let mut out = BTreeSet::new();
     for i in 0..lab.instances.len() as u32 {
         let id = InstanceId(i);
-        out.extend(carriers(lab, id).into_iter().map(|c| (top(lab, id), c)));
+        out.extend(carriers(lab, id).into_iter().map(|c| (lab.outermost(id), c)));
     }
     if let ItemKind::Lab { lines, .. } = &item.kind {
         for line in lines {
             let LabLineKind::Instance { name, literal, .. } = &line.kind else { continue };
             let Some(id) = lab.find_instance(&name.text) else { continue };
             let named = words(sources.slice(literal.span)).filter_map(|w| lab.find_instance(w));
-            out.extend(named.map(|other| (id, top(lab, other))));
+            out.extend(named.map(|other| (id, lab.outermost(other))));
         }
     }
     let mut coupled: BTreeMap<usize, BTreeSet<InstanceId>> = BTreeMap::new();
     for ((id, ..), parts) in &lab.flows {
-        parts.iter().for_each(|c| coupled.entry(c.process).or_default().extend([top(lab, *id)]));
+        parts.iter().for_each(|c| coupled.entry(c.process).or_default().extend([lab.outermost(*id)]));
     }
     for (state, parts) in &lab.rates {
-        let owner = top(lab, lab.state_owner[*state as usize]);
+        let owner = lab.outermost(lab.state_owner[*state as usize]);
         parts.iter().for_each(|c| coupled.entry(c.process).or_default().extend([owner]));
     }
     for together in coupled.values() {
@@ -346,14 +346,7 @@ fn bonds(lab: &Elaborator<'_>, sources: &Sources, item: &Item) -> BTreeSet<(Inst
 
 /// What a thing stands on or in.
 fn carriers(lab: &Elaborator<'_>, id: InstanceId) -> Vec<InstanceId> {
-    lab.instances[id.0 as usize].placed.iter().map(|(_, on)| top(lab, *on)).collect()
-}
-
-fn top(lab: &Elaborator<'_>, mut id: InstanceId) -> InstanceId {
-    while let Some(owner) = lab.instances[id.0 as usize].owner {
-        id = owner;
-    }
-    id
+    lab.instances[id.0 as usize].placed.iter().map(|(_, on)| lab.outermost(*on)).collect()
 }
 
 /// The words of a module's items that are no labs; put together once, for all workflows.

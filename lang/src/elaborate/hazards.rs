@@ -80,11 +80,8 @@ impl Hazard {
     /// The whole things that it is about, in words.
     pub fn about(&self, lab: &Elaborator<'_>) -> String {
         let whole = |name: &str| {
-            let mut id = (0..lab.instances.len()).find(|i| lab.instances[*i].name == name);
-            while let Some(owner) = id.and_then(|i| lab.instances[i].owner) {
-                id = Some(owner.0 as usize);
-            }
-            format!("`{}`", id.map_or(name, |i| lab.instances[i].name.as_str()))
+            let id = lab.instances.iter().position(|i| i.name == name).map(|i| lab.outermost(InstanceId(i as u32)));
+            format!("`{}`", id.map_or(name, |id| lab.instances[id.0 as usize].name.as_str()))
         };
         let things: Vec<String> = self.things().map(whole).collect();
         things.join(" with ")

@@ -267,10 +267,10 @@ impl<'a> Planner<'a, '_> {
         let mut out = Vec::new();
         for action in actions {
             match action {
-                Action::Assign { state, .. } => out.push(self.top(self.lab.state_owner[*state as usize])),
+                Action::Assign { state, .. } => out.push(self.lab.outermost(self.lab.state_owner[*state as usize])),
                 Action::Move { from, to, .. } => {
                     for mixture in [from, to] {
-                        out.extend(self.lab.mixtures.get(*mixture as usize).map(|i| self.top(*i)));
+                        out.extend(self.lab.mixtures.get(*mixture as usize).map(|i| self.lab.outermost(*i)));
                     }
                 }
             }
@@ -297,13 +297,6 @@ impl<'a> Planner<'a, '_> {
         out.sort_unstable();
         out.dedup();
         out
-    }
-
-    fn top(&self, mut id: InstanceId) -> InstanceId {
-        while let Some(owner) = self.lab.instances[id.0 as usize].owner {
-            id = owner;
-        }
-        id
     }
 
     /// What a skill with a body needs, keeps, promises and takes.

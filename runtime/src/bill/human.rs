@@ -1,5 +1,7 @@
 //! The bill as it is read in a terminal.
 
+use matterix_ir::model::OUTSIDE;
+
 use super::{Bill, Quantity, ReagentLine, SolidLine};
 use crate::record::report::text::{Align, Table, amount, digits, mass};
 
@@ -169,7 +171,7 @@ fn mixtures(bill: &Bill) -> Option<String> {
     let mut table = Table::new(&[Left, Left]);
     for m in &bill.mixtures {
         let property = |(name, Quantity { value, unit }): &(String, Quantity)| {
-            let outside = if m.outside.contains(name) { " (outside its model)" } else { "" };
+            let outside = if m.outside.contains(name) { OUTSIDE } else { "" };
             format!("{name} {}{}{unit}{outside}", digits(*value), if unit.is_empty() { "" } else { " " })
         };
         let solid = |s: &SolidLine| format!("{} {}, solid ({})", amount(s.amount / 1e3), s.name, mass(s.mass));

@@ -382,11 +382,8 @@ impl<'p> Stage<'p> {
     }
 
     /// What an instance is a part of, parts of parts included; itself where it is of nothing.
-    pub fn whole(&self, mut id: InstanceId) -> InstanceId {
-        while let Some(owner) = self.scene.get(id).owner {
-            id = owner;
-        }
-        id
+    pub fn whole(&self, id: InstanceId) -> InstanceId {
+        self.scene.whole(id)
     }
 
     /// Whether an instance is one of these or part of one.

@@ -60,8 +60,7 @@ impl<'a> Column<'a> {
     pub(super) fn observable(run: &Run<'a>, index: usize) -> Option<Column<'a>> {
         let observable = run.program.model.observables.get(index)?;
         let parts = run.recording.observables.get(index)?.iter().collect();
-        let valid = observable.valid.and_then(|i| run.recording.observables.get(i as usize)?.first());
-        let outside = valid.is_some_and(|valid| valid.values().any(|holds| holds != 1.0));
+        let outside = run.validity(observable).is_some_and(|valid| valid.values().any(|holds| holds != 1.0));
         Some(Column { name: &observable.name, shown: Shown::Quantity(&observable.unit), parts, outside })
     }
 

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use matterix_ir::model::Observable;
 use matterix_ir::plan::StepId;
 use matterix_ir::{Program, Sources, Span};
 use serde::Serialize;
 
 use super::recording::Recording;
+use super::series::Series;
 use crate::run::{Fidelity, Finding};
 
 /// How a run ended.
@@ -81,6 +83,11 @@ pub struct Place {
 }
 
 impl<'a> Run<'a> {
+    /// Whether the model of an observable holds, 1 where it does; none where it always does.
+    pub(super) fn validity(&self, observable: &Observable) -> Option<&'a Series> {
+        self.recording.observables.get(observable.valid? as usize)?.first()
+    }
+
     /// Where a span begins.
     pub fn place(&self, span: Span) -> Place {
         let known = self.sources.get(span.file);

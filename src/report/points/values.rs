@@ -2,6 +2,7 @@
 
 use matterix_ir::Unit;
 use matterix_ir::listing::joined;
+use matterix_ir::model::OUTSIDE;
 use matterix_ir::points::{Fact, Value};
 use matterix_ir::quantity::show_number;
 
@@ -40,9 +41,6 @@ pub(super) fn value(value: &Value) -> String {
         },
     }
 }
-
-/// What stands beside a number where the model that gave it does not hold.
-const OUTSIDE: &str = " (outside its model)";
 
 /// Whether anything is known of a value.
 fn is_known(value: &Value) -> bool {

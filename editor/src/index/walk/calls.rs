@@ -104,13 +104,12 @@ impl Walk<'_> {
             }
             let device = |this: &mut Self, command: DefId| -> Sort {
                 let takes = this.front(command).next().is_some();
+                let is_behind = call.words.len() > words || call.object.is_some();
                 let by = call.labelled.iter().find(|(l, _)| l.text == "by").map(|b| &b.1);
-                let word = call.words.get(words);
-                match (takes, word, &call.object, by) {
-                    (false, Some(word), _, _) => this.quietly(|w| w.name(word, &[]).sort),
-                    (false, None, Some(object), _) => this.quietly(|w| w.expr(object).sort),
-                    (_, _, _, Some(by)) => this.quietly(|w| w.expr(by).sort),
-                    _ => Sort::Any,
+                match by {
+                    _ if !takes && is_behind => this.behind(call, words),
+                    Some(by) => this.quietly(|w| w.expr(by).sort),
+                    None => Sort::Any,
                 }
             };
             let mut best: Option<(usize, DefId)> = None;
@@ -122,11 +121,7 @@ impl Walk<'_> {
                     }
                     _ => {
                         let first = self.front(*def).next();
-                        let given = match (call.words.get(words), &call.object) {
-                            (Some(word), _) => self.quietly(|w| w.name(word, &[]).sort),
-                            (None, Some(object)) => self.quietly(|w| w.expr(object).sort),
-                            (None, None) => Sort::Any,
-                        };
+                        let given = self.behind(call, words);
                         let fits = first.is_none_or(|p| self.index.may_be(&given, &self.index.def(p).sort));
                         if fits { 0 } else { 100 }
                     }
@@ -148,6 +143,15 @@ impl Walk<'_> {
             let p = self.index.def(*p);
             p.kind == Kind::Parameter && p.label.is_none()
         })
+    }
+
+    /// What kind of value stands behind so many words of a verb.
+    fn behind(&mut self, call: &Call, words: usize) -> Sort {
+        match (call.words.get(words), &call.object) {
+            (Some(word), _) => self.quietly(|w| w.name(word, &[]).sort),
+            (None, Some(object)) => self.quietly(|w| w.expr(object).sort),
+            (None, None) => Sort::Any,
+        }
     }
 
     /// How badly a call's prepositions fit.

@@ -69,6 +69,13 @@ impl Rest {
         Some((start, point.basis.held.iter().map(|i| self.whole(*i)).collect()))
     }
 
+    /// The same where the formal member keeps that activity.
+    fn at_limit(&self, free: &Problem<'_>, solution: &Solution, activity: f64) -> Option<Begin> {
+        let (start, mut held) = self.begin(free, solution, activity)?;
+        held.push(self.member);
+        Some(Begin::AtLimit(start, held, activity))
+    }
+
     /// The arguments of the rest, where the formal member has an activity of this logarithm.
     fn args(&self, problem: &Problem<'_>, activity: f64) -> Vec<f64> {
         let (all, layout) = (problem.layout, self.system.layout());
@@ -96,12 +103,7 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
     let lacking = free.lacking();
     let binds = |i: usize| i != rest.member && basis.of[i][c] != 0.0 && free.may_be(i, &lacking);
     if !(0..basis.of.len()).any(binds) {
-        let open = |activity: f64| {
-            let solution = solve(&rest.system, &rest.args(free, activity))?;
-            let (start, mut held) = rest.begin(free, &solution, activity)?;
-            held.push(rest.member);
-            Some(Begin::AtLimit(start, held, activity))
-        };
+        let open = |activity: f64| rest.at_limit(free, &solve(&rest.system, &rest.args(free, activity))?, activity);
         return OPEN.into_iter().find_map(open);
     }
     let bound = |of: &dyn Fn(usize) -> f64| (0..basis.of.len()).map(|i| basis.of[i][c] * of(i)).sum::<f64>();
@@ -129,9 +131,7 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
         let solution = solve(&rest.system, &rest.args(free, limit))?;
         let (excess, rounded) = excess(&solution);
         if sign * excess >= -rounded {
-            let (start, mut held) = rest.begin(free, &solution, limit)?;
-            held.push(rest.member);
-            return Some(Begin::AtLimit(start, held, limit));
+            return rest.at_limit(free, &solution, limit);
         }
     }
     let (activity, solution) = last?;

@@ -98,11 +98,7 @@ impl Walk<'_, '_> {
     /// Where the whole thing stands in the lab that a hazard is about.
     fn declared_at(&self, hazard: &Hazard) -> Span {
         let lab = self.eyes.lab;
-        let mut thing = hazard.about;
-        while let Some(owner) = thing.and_then(|id| lab.instances[id.0 as usize].owner) {
-            thing = Some(owner);
-        }
-        thing.map_or(self.place(), |id| lab.instances[id.0 as usize].span)
+        hazard.about.map_or(self.place(), |id| lab.instances[lab.outermost(id).0 as usize].span)
     }
 
     /// Judges the hazards of what the text gives for the start, where it is given.

@@ -149,6 +149,14 @@ impl Elaborator<'_> {
         footing(&body, &place, bearing.iter().map(|(shape, at)| (shape, *at)))
     }
 
+    /// What an instance is a part of, parts of parts included; itself where it is of nothing.
+    pub fn outermost(&self, mut id: InstanceId) -> InstanceId {
+        while let Some(owner) = self.instances[id.0 as usize].owner {
+            id = owner;
+        }
+        id
+    }
+
     /// An instance and what it is a part of.
     fn whole(&self, id: InstanceId) -> Vec<InstanceId> {
         std::iter::successors(Some(id), |id| self.instances[id.0 as usize].owner).collect()

@@ -135,10 +135,7 @@ fn bodies(stage: &Stage<'_>) -> Bodies {
     let mut out = Bodies::default();
     let told = scene.instances.iter().enumerate().filter(|(_, i)| i.seen().chain(i.hull()).next().is_some());
     for (index, instance) in told {
-        let mut whole = instance;
-        while let Some(owner) = whole.owner.and_then(|o| scene.instances.get(o.0 as usize)) {
-            whole = owner;
-        }
+        let whole = scene.get(scene.whole(InstanceId(index as u32)));
         out.things.push(Thing {
             name: instance.name.clone(),
             whole: whole.name.clone(),

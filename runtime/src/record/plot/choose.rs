@@ -154,8 +154,8 @@ fn unit_panel(unit: &Unit, columns: Vec<(Column<'_>, bool)>) -> Option<Panel> {
         }
     }
     let mut panel = panel(String::new(), &unit.symbol, lines)?;
-    let outside: BTreeSet<String> = columns.iter().filter(|(c, _)| c.outside).map(|(c, _)| c.part_name(0)).collect();
-    let outside: Vec<bool> = panel.series.iter().map(|line| outside.contains(&line.name)).collect();
+    let is_outside = |name: &str| columns.iter().any(|(c, _)| c.outside && c.part_name(0) == name);
+    let outside: Vec<bool> = panel.series.iter().map(|line| is_outside(&line.name)).collect();
     let mut kinds: Vec<String> = Vec::new();
     for line in &panel.series {
         let kind = kind(&line.name).to_owned();

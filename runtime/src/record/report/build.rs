@@ -84,8 +84,7 @@ fn container(run: &Run<'_>, mixture: &Mixture) -> ContainerReport {
         let short = observable.name.strip_prefix(&name).map_or(observable.name.as_str(), |n| n.trim_start_matches('.'));
         let components = run.recording.observables.get(index as usize)?.iter();
         let values = components.map(|c| observable.unit.of_si(end(c))).collect();
-        let holds = observable.valid.and_then(|i| run.recording.observables.get(i as usize)?.first());
-        let outside = holds.is_some_and(|holds| end(holds) != 1.0);
+        let outside = run.validity(observable).is_some_and(|holds| end(holds) != 1.0);
         Some(PropertyReport { name: short.to_owned(), values, unit: observable.unit.symbol.clone(), outside })
     };
     ContainerReport {

@@ -1,6 +1,7 @@
 //! The report as it is read in a terminal.
 
 use matterix_ir::Severity;
+use matterix_ir::model::OUTSIDE;
 use matterix_ir::quantity::show_number;
 
 use super::text::{Align, Table, amount, digits, mass, quantity, seconds};
@@ -131,7 +132,7 @@ fn container(container: &ContainerReport) -> Option<String> {
     let show = |p: &super::PropertyReport| {
         let values: Vec<String> = p.values.iter().map(|&v| digits(v)).collect();
         let values = if values.len() == 1 { values.concat() } else { format!("({})", values.join(", ")) };
-        let outside = if p.outside { " (outside its model)" } else { "" };
+        let outside = if p.outside { OUTSIDE } else { "" };
         format!("{} {values}{}{}{outside}", p.name, if p.unit.is_empty() { "" } else { " " }, p.unit)
     };
     let known = |p: &&super::PropertyReport| p.values.iter().all(|v| v.is_finite());
