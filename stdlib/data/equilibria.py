@@ -260,7 +260,7 @@ FIELDS = [
     ("boiling_point", "{} degC", "crc"), ("dissolves", "{}", None), ("pka", "{}", "pka_source"), ("pkah", "{}", "pkah_source"),
     ("solubility", "{} g/kg", "solubility_source"), ("heat_of_solution", "{} kJ/mol", "heat_source"),
     ("absorbs", "({}) L/(mol*cm)", "absorbs_source"), ("crowding", "{} mL/mol", "dh"),
-    ("ion_size", "{} nm", "pdh"), ("salting", "{}", "pdh"), ("gas_solubility", "{} mmol/kg", "gas_source"), ("fatal_in_air", "{}", "fatal_source"),
+    ("ion_size", "{} nm", "pdh"), ("salting", "{}", "pdh"), ("diffusion", "{}e-9 m^2/s", "diffusion_source"), ("gas_solubility", "{} mmol/kg", "gas_source"), ("fatal_in_air", "{}", "fatal_source"),
 ]
 
 

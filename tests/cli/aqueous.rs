@@ -110,15 +110,59 @@ fn a_ph_without_water_is_told_of_the_vessel_that_has_none() {
 #[test]
 fn heat_of_what_dissolves_whole_is_told_by_its_name() {
     let then = "    expect cup.contents.temperature < 30 degC";
-    let urea = poured("urea", EQUILIBRIA, "30 g of urea", "100 g of water", then);
-    assert!(
-        urea.contains("ignores the heat of dissolving urea: about -1") && !urea.contains("neutralisation"),
-        "{urea}"
+    // 25 g of urea take up 6.2 kJ, which leaves 100 g of water some 14 K colder.
+    let colder = "    expect cup.contents.temperature in 9 degC .. 13 degC";
+    let urea = poured("urea", EQUILIBRIA, "30 g of urea", "100 g of water", colder);
+    assert!(urea.contains("no findings"), "{urea}");
+    let made = format!(
+        "{EQUILIBRIA}reaction hydrolysis: urea + 2 water -> CO2 + 2 NH3 {{ rate: 1e-9 1/s, order: {{ urea: 1 }} }}\n"
     );
+    let made = poured("urea_made", &made, "30 g of urea", "100 g of water", then);
+    assert!(made.contains("ignores the heat of dissolving urea: about -1"), "{made}");
+    assert!(made.contains("allow heat_of_dissolving_left_out"), "{made}");
     let pack = poured("cold_pack", EQUILIBRIA, "30 g of NH4Cl", "100 g of water", then);
     assert!(pack.contains("takes the heat of diluting NH4+ from another ion"), "{pack}");
     let thin = poured("thin", EQUILIBRIA, "100 g of water + 10 mmol of NH4Cl", "100 g of water", then);
     assert!(!thin.contains("another ion"), "{thin}");
+}
+
+#[test]
+fn a_dry_acid_is_as_warm_as_its_solid() {
+    let dir = folder("dry_acid");
+    // Little of benzoic acid dissolves: what stays solid neither warms nor cools, whichever of the two species was weighed.
+    let text = |weighed: &str| {
+        format!(
+            "mtx 1
+use std::equilibria
+use std::acids
+use std::glassware::Beaker250mL
+extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 s
+    effect move(m, from: source, to: target)
+asset Cup: Beaker250mL {{ contents: {{ air: 0 W/K }}, wall: 0 W/K }}
+lab bench {{
+    ambient: 25 degC
+    jar = Cup at (0, 0, 0) m holding 20 g of {weighed}
+    cup = Cup at (1, 0, 0) m holding 100 g of water
+}}
+workflow go in bench {{
+    weigh_out 20 g from jar into cup
+    wait 10 ms
+    note \"cools by {{25 degC - cup.contents.temperature as K :.3}}\"
+}}
+"
+        )
+    };
+    let cools = |name: &str, weighed: &str| {
+        write(&dir, name, text(weighed));
+        let out = matterixc_in(&dir, &["run", name]).out;
+        let (_, said) = out.rsplit_once("cools by ").expect("the note is told");
+        said.split_whitespace().next().and_then(|word| word.parse::<f64>().ok()).expect("a number")
+    };
+    let (acid, solid) = (cools("acid.mtx", "benzoic_acid"), cools("solid.mtx", "benzoic_acid(s)"));
+    assert!((acid - solid).abs() < 0.002, "{acid} against {solid}");
+    // 3.6 mmol dissolve, with some 20 kJ/mol.
+    assert!(acid > 0.1 && acid < 0.25, "{acid}");
 }
 
 /// What `check` and `run` say of a lab with these lines, and a note of these values.

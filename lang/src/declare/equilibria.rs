@@ -46,6 +46,13 @@ impl EquilibriumDef<'_> {
         let side = |s| self.terms.iter().find(|(t, _)| *t == s).map(|(_, n)| *n > 0.0);
         Some(side(a)? == side(b)?)
     }
+
+    /// Its solid, and 1 where it dissolves from left to right or -1: where a mole of it becomes a mole of one species, and those are as asked.
+    pub fn dissolving_whole(&self, wanted: impl Fn(SpeciesId, SpeciesId) -> bool) -> Option<(SpeciesId, f64)> {
+        let ([(a, from), (b, to)], [solid]) = (self.terms.as_slice(), self.solids.as_slice()) else { return None };
+        let (other, way) = if a == solid { (b, *to) } else { (a, *from) };
+        (from + to == 0.0 && wanted(*solid, *other)).then(|| (*solid, way.signum()))
+    }
 }
 
 /// Reads every `equilibrium` item; those with unknown species are reported and left out.

@@ -726,6 +726,17 @@ impl<'a> Elaborator<'a> {
         self.tables.equilibria.iter().any(|e| e.solids.contains(&s))
     }
 
+    /// The heat that a mole of a solid takes up as it dissolves whole, by its equilibrium; 0 where it has none.
+    pub fn heat_of_solid(&mut self, s: SpeciesId) -> NodeId {
+        let ways = self.tables.equilibria.iter().map(|e| e.dissolving_whole(|solid, _| solid == s));
+        let of = ways.enumerate().find_map(|(e, way)| Some((e, way?.1)));
+        let heat = of.and_then(|(e, way)| Some((self.constant_of(e)?.enthalpy, way)));
+        match heat {
+            Some((enthalpy, way)) => self.multiple(way, enthalpy),
+            None => self.graph.number(0.0),
+        }
+    }
+
     /// The amount of a species as it was put into a mixture; none of what cannot be there.
     pub fn put_in(&mut self, id: InstanceId, s: SpeciesId) -> NodeId {
         let state = self.amounts_in(id).find(|(other, _)| *other == s).map(|(_, state)| state);

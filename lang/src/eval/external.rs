@@ -90,6 +90,10 @@ enum Bound {
     Settles,
     /// Whether an equilibrium of the file has a species as a pure solid.
     Solid,
+    /// The solids that dissolve as a species whole.
+    SolidsOf,
+    /// The heat that a mole of such a solid takes up as it dissolves.
+    HeatOfSolid,
     /// The amount of a species that was put into a mixture.
     Put,
     /// The amount of a species at equilibrium once all salts have dissolved.
@@ -140,6 +144,8 @@ const TABLE: &[(&str, Bound)] = &[
     ("balanced", Bound::Balanced),
     ("settles", Bound::Settles),
     ("is_solid", Bound::Solid),
+    ("solids_of", Bound::SolidsOf),
+    ("heat_of_solid", Bound::HeatOfSolid),
     ("put_in", Bound::Put),
     ("ready", Bound::Ready),
     ("opposed", Bound::Opposed(true)),
@@ -350,6 +356,14 @@ impl Elaborator<'_> {
             (Bound::Solid, [Value::Species(s)]) => {
                 let is_solid = self.is_solid(*s);
                 self.certain(is_solid)
+            }
+            (Bound::SolidsOf, [Value::Species(s)]) => {
+                let solids = self.tables.equilibria.iter().filter_map(|e| e.dissolving_whole(|_, other| other == *s));
+                Value::List(solids.map(|(solid, _)| Value::Species(solid)).collect())
+            }
+            (Bound::HeatOfSolid, [Value::Species(s)]) => {
+                let node = self.heat_of_solid(*s);
+                self.num(node, self.tables.units.named("Energy").over(&self.tables.units.named("Amount")))
             }
             (Bound::Put, [Value::Instance(m), Value::Species(s)]) => {
                 let node = self.put_in(*m, *s);

@@ -88,7 +88,7 @@ impl Walk<'_, '_> {
             if self.eyes.nominal_truth(hazard.when, world) != Some(true) {
                 continue;
             }
-            let d = self.hazard(hazard, world, place, "declared here");
+            let d = self.hazard(hazard, self.worded(hazard, world), world, (place, "declared here"));
             if !self.found.iter().any(|f| f.span() == d.span() && f.code == d.code) {
                 self.found.push(d);
             }
@@ -108,7 +108,7 @@ impl Walk<'_, '_> {
             let Watched::Given(span) = hazard.watched else { continue };
             if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
                 let place = span.unwrap_or_else(|| self.declared_at(hazard));
-                let d = self.hazard(hazard, world, place, "given here");
+                let d = self.hazard(hazard, self.worded(hazard, world), world, (place, "given here"));
                 self.tell(i, d);
             }
         }
@@ -128,7 +128,7 @@ impl Walk<'_, '_> {
                 let hazard = &self.hazards.all[i];
                 let world = &*self.seen_by(i, world);
                 if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
-                    let d = self.hazard(hazard, world, held.span, "dispensed here");
+                    let d = self.hazard(hazard, self.worded(hazard, world), world, (held.span, "dispensed here"));
                     self.tell(i, d);
                 }
             }
@@ -167,8 +167,12 @@ impl Walk<'_, '_> {
                 _ => (self.place(), "this step causes it"),
             };
             let law = law.filter(|_| hazard.watched != Watched::Steps);
-            let mut d =
-                self.hazard(hazard, world, law.unwrap_or(place), if law.is_some() { "used here" } else { said });
+            let mut d = self.hazard(
+                hazard,
+                self.worded(hazard, world),
+                world,
+                (law.unwrap_or(place), if law.is_some() { "used here" } else { said }),
+            );
             if law.is_some() {
                 d = d.because(place, said);
             }
@@ -234,12 +238,11 @@ impl Walk<'_, '_> {
     fn used_after(&mut self, i: usize, world: &MixtureState) {
         let Some((place, words)) = self.hazards.since.remove(&i) else { return };
         let world = &*self.seen_by(i, world);
-        let mut d = self.hazard(&self.hazards.all[i], world, self.place(), "used here");
-        if !words.is_empty() {
-            d.headline = words;
-        }
-        d = d.because(place, "mixed here");
-        self.tell(i, d);
+        let hazard = &self.hazards.all[i];
+        // What was so after the transfer is what counts.
+        let words = Some(words).filter(|words| !words.is_empty()).or_else(|| self.worded(hazard, world));
+        let d = self.hazard(hazard, words, world, (self.place(), "used here"));
+        self.tell(i, d.because(place, "mixed here"));
     }
 
     fn used_here(&mut self, i: usize, world: &MixtureState) {
@@ -250,7 +253,7 @@ impl Walk<'_, '_> {
         let world = &*self.seen_by(i, world);
         if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
             let said = if matches!(hazard.watched, Watched::Transfer(..)) { "mixed here" } else { "used here" };
-            let d = self.hazard(hazard, world, self.place(), said);
+            let d = self.hazard(hazard, self.worded(hazard, world), world, (self.place(), said));
             self.hazards.present.insert(i);
             self.tell(i, d);
         }
@@ -305,8 +308,13 @@ impl Walk<'_, '_> {
         text.show(value, instance).ok()
     }
 
-    fn hazard(&self, hazard: &Hazard, world: &MixtureState, place: Span, said: &str) -> Diagnostic {
-        let words = self.worded(hazard, world);
+    fn hazard(
+        &self,
+        hazard: &Hazard,
+        words: Option<String>,
+        world: &MixtureState,
+        (place, said): (Span, &str),
+    ) -> Diagnostic {
         let in_words = words.is_some();
         let headline = words.unwrap_or_else(|| hazard.headline());
         let mut d = Diagnostic::error(hazard.code(), place, headline, said);
