@@ -165,6 +165,72 @@ workflow go in bench {{
     assert!(acid > 0.1 && acid < 0.25, "{acid}");
 }
 
+/// A caution of one's own names what `any` has found, as those of the library do.
+#[test]
+fn a_caution_names_what_any_finds() {
+    let dir = folder("own_caution");
+    let checked = |when: &str, because: &str| {
+        let text = format!(
+            "mtx 1
+use std::equilibria
+use std::glassware::Beaker250mL
+caution own(m: Mixture)
+    when {when}
+    \"dilute it\"
+    because \"{because}\"
+lab bench {{
+    ambient: 25 degC
+    cup = Beaker250mL at (0, 0, 0) m holding 50 g of water + 5 mmol of acetic_acid + 5 mmol of NH3
+}}
+workflow go in bench {{
+    wait 1 s
+}}
+"
+        );
+        checked(&dir, text)
+    };
+    let one = checked("any(s in m.species: s.charge > 0 and m.amount[s] > 1 mmol)", "much {s} in {whole(m)}");
+    assert!(one.contains("much NH4+ in cup") && !one.contains("error"), "{one}");
+    let two = checked(
+        "any(s in having(m.species, \"pka\"): any(t in having(m.species, \"pkah\"): min(m.amount[s], m.amount[t]) > 1 mmol))",
+        "{s} beside {t}",
+    );
+    assert!(two.contains("NH4+ beside acetate") && !two.contains("error"), "{two}");
+    let unknown = checked("any(s in m.species: m.amount[s] > 1 mmol)", "much {q}");
+    assert!(unknown.contains("unknown name `q`"), "{unknown}");
+}
+
+/// The controller of the plate integrates within 5 K of its set point: a difference of two temperatures, which is rounded as they are.
+#[test]
+fn a_plate_beside_equilibria_comes_near_its_set_point() {
+    let dir = folder("plate");
+    let text = |target: u32| {
+        format!(
+            "mtx 1
+use std::equilibria
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+lab bench {{
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    cup = Beaker250mL on plate holding 50 g of water + 5 mmol of HCl
+}}
+workflow go in bench {{
+    heat plate to {target} degC
+    wait 2 h
+}} finally {{
+    stop heating plate
+}}
+"
+        )
+    };
+    for target in [180, 250] {
+        write(&dir, "plate.mtx", text(target));
+        let out = matterixc_in(&dir, &["run", "plate.mtx"]).out;
+        assert!(out.contains("go in bench: passed after 7200 s"), "{target}: {out}");
+    }
+}
+
 /// What `check` and `run` say of a lab with these lines, and a note of these values.
 fn looked_at(name: &str, uses: &str, lines: &str, values: &str) -> (String, String) {
     let dir = folder(name);

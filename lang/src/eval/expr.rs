@@ -575,6 +575,16 @@ impl<'a> Elaborator<'a> {
             self.report(d.help(format!("use {}", known.join(", "))));
             return Value::Error;
         }
+        if items.is_empty() && self.prototype && self.observed.is_some() {
+            // A stand-in has none of these: what is said of one is checked with nothing known of it.
+            scope.bind(var.text.clone(), Value::Error);
+            let none = Value::Bool(self.graph.number(0.0));
+            self.observe_one(fold, None, None, |lab| {
+                lab.expr(body, scope);
+                (none, scope.vars.clone())
+            });
+            scope.vars.pop();
+        }
         let mut result: Option<Value> = None;
         let is_of_each =
             fold.text == "all" && items.len() > 1 && self.open_members.is_empty() && self.open_calls.is_empty();

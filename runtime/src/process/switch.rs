@@ -16,7 +16,8 @@ use super::timed::kinds;
 /// Sides whose bounds are this share of them apart do not meet, whatever rounding makes of them.
 const CLEAR: f64 = 1e-9;
 
-/// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
+/// A difference smaller than this many units of rounding is no evidence that a comparison has changed: of what its sides are made of by sums,
+/// as 5 K between two temperatures is rounded as they are.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
 /// A time at which two clocks have changed places if they ever do, s.
@@ -135,14 +136,14 @@ impl Switch {
         }
     }
 
-    fn clearly_changed(&self, left: f64, right: f64) -> bool {
+    /// The same by more than `noise`.
+    fn clearly_changed(&self, left: f64, right: f64, noise: f64) -> bool {
         let apart = match self.is {
             Is::Compared { .. } => left - right,
             Is::Whole(number) if left < number => left - number,
             Is::Whole(number) => left - (number + 1.0),
         };
-        let is_noise = apart.abs() <= NOISE * left.abs().max(right.abs());
-        self.changed(left, right) && !is_noise
+        self.changed(left, right) && !(apart.abs() <= noise)
     }
 }
 
@@ -162,6 +163,8 @@ pub(super) struct Switches {
     tape: Tape,
     list: Vec<Switch>,
     registers: Vec<f64>,
+    /// How large what each register is made of is.
+    sizes: Vec<f64>,
     /// Whether the sides of each comparison follow states and time in straight lines.
     straight: Vec<bool>,
     /// How far the sides of each are apart in the piece that was sampled last.
@@ -296,8 +299,7 @@ impl Switches {
                 // The polynomial through the points is not a curved side itself, nor a state that has died out.
                 path(after, moving);
                 self.run(after, moving);
-                let test = if self.straight[i] { Switch::changed } else { Switch::clearly_changed };
-                if !self.is_changed(i, test) {
+                if !self.is_changed(i, if self.straight[i] { 0.0 } else { self.apart[i].noise }) {
                     continue;
                 }
                 located.push((self.locate(i, before, after, moving, path), i));
@@ -340,15 +342,18 @@ impl Switches {
         apart.resize(self.list.len(), Apart::default());
         for (k, share) in POINTS.into_iter().enumerate() {
             self.tape.run(self.clock.lab(instant(piece, share)), &self.ends[k], &mut self.registers);
+            self.tape.sizes(&self.registers, &mut self.sizes);
             for (i, apart) in apart.iter_mut().enumerate() {
                 let (left, right) = self.sides(i);
                 apart.by[k] = match self.list[i].is {
                     Is::Compared { .. } => left - right,
                     Is::Whole(number) => left - number,
                 };
-                apart.noise = apart.noise.max(NOISE * left.abs().max(right.abs()));
+                let (larger, smaller) = sides(&self.tape, &self.sizes, i);
+                let noise = NOISE * larger.max(smaller);
+                apart.noise = apart.noise.max(noise);
                 // What is so at the start has been seen before.
-                apart.changed[k] = k > 0 && self.list[i].clearly_changed(left, right);
+                apart.changed[k] = k > 0 && self.list[i].clearly_changed(left, right, noise);
             }
         }
         self.apart = apart;
@@ -411,7 +416,7 @@ impl Switches {
                 path(middle, moving);
                 self.run(middle, moving);
                 next.push((from, middle));
-                if self.is_changed(i, Switch::clearly_changed) {
+                if self.is_changed(i, self.apart[i].noise) {
                     // What comes later does not matter any more.
                     seen = Some((from, middle));
                     break;
@@ -436,9 +441,10 @@ impl Switches {
         self.list[list[place]].stays(left, right)
     }
 
-    fn is_changed(&self, i: usize, test: fn(&Switch, f64, f64) -> bool) -> bool {
+    /// Whether switch `i` has changed by more than `noise`, or at all where that is 0, after [`Switches::run`].
+    fn is_changed(&self, i: usize, noise: f64) -> bool {
         let (left, right) = self.sides(i);
-        test(&self.list[i], left, right)
+        if noise > 0.0 { self.list[i].clearly_changed(left, right, noise) } else { self.list[i].changed(left, right) }
     }
 
     /// Bisects to the first instant after `low` at which switch `i` has changed, as it has at `high`.
@@ -454,7 +460,7 @@ impl Switches {
             let middle = low + 0.5 * (high - low);
             path(middle, moving);
             self.run(middle, moving);
-            if self.is_changed(i, Switch::changed) {
+            if self.is_changed(i, 0.0) {
                 high = middle;
             } else {
                 low = middle;
@@ -475,7 +481,7 @@ impl Switches {
         let later = (time + 8.0 * rounding(time)).min(limit);
         path(later, moving);
         self.run(later, moving);
-        if self.is_changed(i, Switch::changed) { later } else { time }
+        if self.is_changed(i, 0.0) { later } else { time }
     }
 }
 

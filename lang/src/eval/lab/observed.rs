@@ -81,7 +81,9 @@ impl<'a> Elaborator<'a> {
             _ => None,
         };
         let is_inner = !self.open_calls.is_empty() || !self.open_members.is_empty();
-        let decided = node.and_then(|node| self.graph.constant(node)).map(|value| value != 0.0);
+        // What holds of a stand-in says nothing of the things that a lab has.
+        let constant = node.filter(|_| !self.prototype).and_then(|node| self.graph.constant(node));
+        let decided = constant.map(|value| value != 0.0);
         let Some(observed) = &mut self.observed else { return value };
         if let Some(each) = each {
             observed.compared.iter_mut().skip(compared).for_each(|c| c.each.push(each));
