@@ -200,6 +200,34 @@ workflow go in bench {{
     assert!(unknown.contains("unknown name `q`"), "{unknown}");
 }
 
+#[test]
+fn a_constant_with_a_wrong_digit_is_refused() {
+    let dir = folder("wrong_digit");
+    let checked = |constant: &str| {
+        let text = format!(
+            "mtx 1
+use std::equilibria
+use std::glassware::Beaker250mL
+equilibrium own: Fe3+ + e- <-> Fe2+ {{ {constant} }}
+lab bench {{
+    ambient: 25 degC
+    cup = Beaker250mL at (0, 0, 0) m holding 50 g of water + 5 mmol of HCl
+}}
+workflow go in bench {{
+    wait 1 s
+}}
+"
+        );
+        checked(&dir, text)
+    };
+    let volts = checked("potential: 77.1 V");
+    assert!(volts.contains("the potential of `own` is 77.1 V"), "{volts}");
+    let power = checked("log_constant: -1303");
+    assert!(power.contains("the constant of `own` is 10^-1303 at 25 degC"), "{power}");
+    let right = checked("potential: 0.771 V");
+    assert!(!right.contains("out-of-range"), "{right}");
+}
+
 /// The controller of the plate integrates within 5 K of its set point: a difference of two temperatures, which is rounded as they are.
 #[test]
 fn a_plate_beside_equilibria_comes_near_its_set_point() {

@@ -21,6 +21,7 @@ use crate::eval::lab::{Elaborator, Mode};
 use crate::names::DeclId;
 use crate::units::Dimension;
 use matterix_ir::listing::joined;
+use matterix_ir::quantity::show_number;
 
 /// Gas constant, J/(mol*K).
 const GAS: f64 = 8.314_462_618_153_24;
@@ -562,13 +563,43 @@ impl<'a> Elaborator<'a> {
         let fields = self.tables.equilibria[e].fields;
         let Some(Constant { terms, .. }) = self.constant_of(e) else { return };
         if terms.iter().all(|term| self.glance(*term).is_none_or(f64::is_finite)) {
-            return;
+            return self.check_size(e, &terms);
         }
         let span =
             CONSTANTS.iter().find_map(|key| expr_of(fields, key)).map_or(self.tables.equilibria[e].span, |e| e.span);
         let headline = "the constant of an equilibrium must be above 0";
         let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "not above 0");
         self.report(d.help("for a complete reaction give a large constant: `constant: 1e20`"));
+    }
+
+    /// A constant that is no constant of anything is a slip: 161 V for 1.61 V, a pKa of 475.
+    fn check_size(&mut self, e: usize, terms: &[NodeId]) {
+        let t = self.graph.number(STANDARD);
+        let node = self.constant_of_terms(terms, t);
+        let Some(ln) = self.glance(node) else { return };
+        let fields = self.tables.equilibria[e].fields;
+        let electrons = self.electrons_of(e).abs();
+        let name = &self.tables.equilibria[e].name;
+        let (size, most, headline) = match expr_of(fields, POTENTIAL) {
+            Some(_) => {
+                let volts = ln * GAS * STANDARD / (electrons * FARADAY);
+                (volts, MOST_VOLTS, format!("the potential of `{name}` is {} V", show_number(volts)))
+            }
+            None => {
+                let power = ln / LN_10;
+                let headline = format!("the constant of `{name}` is 10^{} at 25 degC", show_number(power));
+                (power / electrons.max(1.0), MOST_POWERS, headline)
+            }
+        };
+        if size.abs() <= most {
+            return;
+        }
+        let span =
+            CONSTANTS.iter().find_map(|key| expr_of(fields, key)).map_or(self.tables.equilibria[e].span, |e| e.span);
+        let d = Diagnostic::error(codes::OUT_OF_RANGE, span, headline, "no equilibrium in water has that");
+        self.report(d.help(
+            "is a digit, a sign or a unit wrong? half-cells are between -5 and 5 V, constants between 1e-300 and 1e300",
+        ));
     }
 
     /// An equilibrium that follows from those before it must agree with them: each circle of constants closes.
@@ -795,11 +826,16 @@ impl<'a> Elaborator<'a> {
     pub fn constant_at(&mut self, e: usize, temperature: impl FnOnce(&mut Self) -> Option<NodeId>) -> Option<NodeId> {
         let Constant { terms, .. } = self.constant_of(e)?;
         let t = temperature(self)?;
+        Some(self.constant_of_terms(&terms, t))
+    }
+
+    /// The same by its terms.
+    fn constant_of_terms(&mut self, terms: &[NodeId], t: NodeId) -> NodeId {
         let (ln, square) = (self.graph.unary(UnaryOp::Ln, t), self.graph.binary(BinaryOp::Mul, t, t));
         let one = self.graph.number(1.0);
         let over = |lab: &mut Self, node| lab.graph.binary(BinaryOp::Div, one, node);
         let of = [one, over(self, t), ln, t, over(self, square), square];
-        Some(self.sum_of(&terms, &of))
+        self.sum_of(terms, &of)
     }
 
     /// The enthalpy of an equation at a temperature: R T^2 d(ln K) / dT.
@@ -874,6 +910,12 @@ impl<'a> Elaborator<'a> {
 
 /// A factor below this is what rounding left.
 const NO_PART: f64 = 1e-9;
+
+/// Standard potentials are no further from 0, V: that of fluorine is 3.05 V, that of azide -3.3 V.
+const MOST_VOLTS: f64 = 5.0;
+
+/// Constants are no further from 1, powers of ten, of one electron each where there are some: strong complexes come to 50.
+const MOST_POWERS: f64 = 300.0;
 
 /// Temperatures between which water is liquid, K.
 const LIQUID: (f64, f64) = (273.15, 373.15);
