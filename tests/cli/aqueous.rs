@@ -200,6 +200,116 @@ workflow go in bench {{
     assert!(unknown.contains("unknown name `q`"), "{unknown}");
 }
 
+/// What `check` says of `from` weighed into `into`, in vessels without loss of heat, and the temperature after that, degC.
+fn weighed(name: &str, items: &str, from: &str, into: &str) -> (String, f64) {
+    let dir = folder(name);
+    let text = format!(
+        "mtx 1
+use std::glassware::Beaker250mL
+{items}
+extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
+    takes 1 s
+    effect move(m, from: source, to: target)
+asset Cup: Beaker250mL {{ contents: {{ air: 0 W/K }}, wall: 0 W/K }}
+lab bench {{
+    ambient: 25 degC
+    jar = Cup at (0, 0, 0) m holding {from}
+    cup = Cup at (1, 0, 0) m holding {into}
+}}
+workflow go in bench {{
+    weigh_out 20 g from jar into cup
+    wait 10 ms
+    note \"after that {{cup.contents.temperature as degC :.3}} degC\"
+}}
+"
+    );
+    let said = checked(&dir, &text);
+    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
+    let after = out.rsplit_once("after that ").and_then(|(_, rest)| rest.split_whitespace().next()?.parse().ok());
+    (said, after.unwrap_or(f64::NAN))
+}
+
+#[test]
+fn equilibria_that_say_nothing_of_their_heat_are_named() {
+    let lye = "100 g of water + 50 mmol of NaOH";
+    let acid = "20 g of water + 50 mmol of HCl";
+    let water = |more: &str| format!("equilibrium water_splits: water <-> H+ + OH- {{ constant: 1e-14{more} }}");
+    let (said, _) = weighed("own_water", &water(""), acid, lye);
+    assert!(said.contains("leaves out the heat of an equilibrium without an `enthalpy`"), "{said}");
+    let (said, after) = weighed("own_warm_water", &water(", enthalpy: 55.8 kJ/mol"), acid, lye);
+    assert!(!said.contains("without an `enthalpy`") && after > 29.0, "{after}: {said}");
+    // A solid that says how it dissolves has that heat, whatever its equilibrium lacks.
+    let solid = |heat: &str| {
+        format!(
+            "use std::equilibria
+species sweet(s) {{ formula: \"C6H12O6\", molar_volume: 110 mL/mol, heat_capacity: 200 J/(mol*K){heat} }}
+species sweet {{ formula: \"C6H12O6\", molar_volume: 110 mL/mol, heat_capacity: 200 J/(mol*K) }}
+equilibrium sweet_dissolves: sweet(s) <-> sweet {{ log_constant: 0.7 }}"
+        )
+    };
+    let (said, after) =
+        weighed("own_solid", &solid(", heat_of_solution: 20 kJ/mol"), "20 g of sweet(s)", "100 g of water");
+    assert!(!said.contains("without an `enthalpy`") && (after - 19.9).abs() < 0.5, "{after}: {said}");
+    let (said, after) = weighed("own_plain_solid", &solid(""), "20 g of sweet(s)", "100 g of water");
+    assert!(said.contains("may warm or cool it") && (after - 25.0).abs() < 1e-6, "{after}: {said}");
+}
+
+#[test]
+fn what_gets_cold_may_freeze_or_stay_solid() {
+    let (said, _) = weighed("cold_urea", EQUILIBRIA, "20 g of urea", "30 g of water");
+    assert!(said.contains("and may freeze if no heat gets in"), "{said}");
+    let (said, _) = weighed("cold_salt", EQUILIBRIA, "20 g of KNO3", "60 g of water");
+    assert!(said.contains("where not all of KNO3 may dissolve"), "{said}");
+    let (said, _) = weighed("cool_salt", EQUILIBRIA, "20 g of NaCl", "100 g of water");
+    assert!(!said.contains("may freeze") && !said.contains("may dissolve"), "{said}");
+}
+
+#[test]
+fn equilibria_and_layers_need_water_that_stays_apart() {
+    let tautomers = "species keto { formula: \"C5H8O2\", molar_volume: 100 mL/mol, heat_capacity: 200 J/(mol*K) }
+species enol { formula: \"C5H8O2\", molar_volume: 100 mL/mol, heat_capacity: 200 J/(mol*K) }
+equilibrium turns: keto <-> enol { constant: 4, enthalpy: -10 kJ/mol }";
+    let (said, _) = weighed("keto", tautomers, "20 g of EtOH", "30 g of EtOH + 5 mmol of keto");
+    assert!(said.contains("holds no water: there keto keeps the amount that was put in"), "{said}");
+    let (said, _) = weighed("keto_in_water", tautomers, "20 g of water", "30 g of water + 5 mmol of keto");
+    assert!(!said.contains("holds no water"), "{said}");
+    let layer = |liquid: &str| {
+        format!(
+            "species I2_out {{ formula: \"I2\", molar_volume: 60 mL/mol, heat_capacity: 60 J/(mol*K), dissolved_in: {liquid} }}
+equilibrium extraction: I2 <-> I2_out {{ partition: 20, enthalpy: 0 kJ/mol }}"
+        )
+    };
+    let (said, _) = weighed("mixes", &layer("EtOH"), "20 g of EtOH", "30 g of water + 1 mmol of I2");
+    assert!(said.contains("such a liquid mixes with water"), "{said}");
+    let (said, _) = weighed("apart", &layer("CHCl3"), "20 g of CHCl3", "30 g of water + 1 mmol of I2");
+    assert!(!said.contains("mixes with water"), "{said}");
+}
+
+/// Thirteen ions of aluminium at once take up most of what half-neutralised aluminium chloride holds.
+#[test]
+fn large_clusters_are_found() {
+    let dir = folder("cluster");
+    let text = "mtx 1
+use std::equilibria
+use std::metals
+use std::glassware::Beaker250mL
+species Al13^7+ { formula: \"Al13H24O28^7+\", molar_volume: 100 mL/mol, heat_capacity: 0 J/(mol*K) }
+equilibrium al13: 13 Al3+ + 28 water <-> Al13^7+ + 32 H+ { log_constant: -98.73 }
+lab bench {
+    ambient: 25 degC
+    cup = Beaker250mL { contents: { activities: ideal } } at (0, 0, 0) m holding 100 g of water + 1 mmol of Al3+ + 3 mmol of Cl- + 2 mmol of NaOH
+}
+workflow go in bench {
+    wait 1 s
+    expect cup.contents.ph in 4.10 .. 4.12
+    expect cup.contents.amount[Al13^7+] in 0.061 mmol .. 0.063 mmol
+}
+";
+    write(&dir, "cup.mtx", text);
+    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
+    assert!(out.contains("go in bench: passed"), "{out}");
+}
+
 #[test]
 fn a_constant_with_a_wrong_digit_is_refused() {
     let dir = folder("wrong_digit");

@@ -448,7 +448,7 @@ impl<'a> Elaborator<'a> {
         };
         let mut terms = [self.graph.number(0.0); Layout::TERMS];
         terms[0] = ln_k;
-        let Some(enthalpy) = self.enthalpy_of(e, "enthalpy") else {
+        let Some(enthalpy) = self.enthalpy_of(e, "enthalpy").or_else(|| self.heat_of_its_solid(e)) else {
             return Some(Constant { enthalpy: terms[1], terms });
         };
         // The law of van 't Hoff: ln K = ln K(at) + enthalpy / R (1 / at - 1 / T).
@@ -757,6 +757,45 @@ impl<'a> Elaborator<'a> {
         self.tables.equilibria.iter().any(|e| e.solids.contains(&s))
     }
 
+    /// The heat of an equilibrium by which a mole of a solid with a `heat_of_solution` dissolves, if it is that.
+    fn heat_of_its_solid(&mut self, e: usize) -> Option<NodeId> {
+        let way = self.way_of_solid(e)?;
+        let heat = self.number_of(*self.tables.equilibria[e].solids.first()?, HEAT_OF_SOLUTION)?;
+        Some(self.multiple(way, heat))
+    }
+
+    /// 1 where a mole of a solid with a `heat_of_solution` dissolves from left to right, -1 where it does from right to left; none elsewhere.
+    fn way_of_solid(&self, e: usize) -> Option<f64> {
+        let def = &self.tables.equilibria[e];
+        let [solid] = def.solids.as_slice() else { return None };
+        let (_, count) = def.terms.iter().find(|(s, _)| s == solid)?;
+        let is_stated = field(self.tables.species.get(*solid).fields, HEAT_OF_SOLUTION).is_some();
+        (count.abs() == 1.0 && is_stated).then_some(-count.signum())
+    }
+
+    /// Whether an equilibrium is between a species and other uncharged ones that are dissolved with it, without water.
+    pub fn isomerises(&self, s: SpeciesId) -> bool {
+        let is_plain = |(s, _): &(SpeciesId, f64)| {
+            let def = self.tables.species.get(*s);
+            def.charge() == 0 && !def.is_water && !def.is_electron && def.liquid.is_none()
+        };
+        let mut of = self.tables.equilibria.iter().filter(|e| e.gas.is_none() && e.solids.is_empty() && e.involves(s));
+        of.any(|e| e.terms.iter().all(is_plain))
+    }
+
+    /// Whether all equilibria that a species is in, and there are some, say nothing of their heat.
+    pub fn lacks_heat(&self, s: SpeciesId) -> bool {
+        let mut of = (0..self.tables.equilibria.len())
+            .filter(|e| self.tables.equilibria[*e].gas.is_none() && self.tables.equilibria[*e].involves(s))
+            .peekable();
+        let says = |e: usize| {
+            let fields = self.tables.equilibria[e].fields;
+            ["enthalpy", HEAT, ANALYTIC].iter().any(|key| expr_of(fields, key).is_some())
+                || self.way_of_solid(e).is_some()
+        };
+        of.peek().is_some() && of.all(|e| !says(e))
+    }
+
     /// The heat that a mole of a solid takes up as it dissolves whole, by its equilibrium; 0 where it has none.
     pub fn heat_of_solid(&mut self, s: SpeciesId) -> NodeId {
         let ways = self.tables.equilibria.iter().map(|e| e.dissolving_whole(|solid, _| solid == s));
@@ -900,13 +939,17 @@ impl<'a> Elaborator<'a> {
                 _ => None,
             };
         }
-        if expr_of(fields, "enthalpy").or_else(|| expr_of(fields, ANALYTIC)).is_some() {
+        if expr_of(fields, "enthalpy").or_else(|| expr_of(fields, ANALYTIC)).is_some() || self.way_of_solid(e).is_some()
+        {
             return Some((self.graph.number(LIQUID.0), self.graph.number(LIQUID.1)));
         }
         let (at, reach) = (self.given_at(e)?, self.graph.number(NEAR));
         Some((self.graph.binary(BinaryOp::Sub, at, reach), self.graph.binary(BinaryOp::Add, at, reach)))
     }
 }
+
+/// What a species says of the heat of dissolving it.
+const HEAT_OF_SOLUTION: &str = "heat_of_solution";
 
 /// A factor below this is what rounding left.
 const NO_PART: f64 = 1e-9;

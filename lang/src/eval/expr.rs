@@ -579,10 +579,12 @@ impl<'a> Elaborator<'a> {
             // A stand-in has none of these: what is said of one is checked with nothing known of it.
             scope.bind(var.text.clone(), Value::Error);
             let none = Value::Bool(self.graph.number(0.0));
+            let found = self.diagnostics.len();
             self.observe_one(fold, None, None, |lab| {
                 lab.expr(body, scope);
                 (none, scope.vars.clone())
             });
+            self.diagnostics.truncate(found);
             scope.vars.pop();
         }
         let mut result: Option<Value> = None;

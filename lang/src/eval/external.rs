@@ -90,6 +90,10 @@ enum Bound {
     Settles,
     /// Whether an equilibrium of the file has a species as a pure solid.
     Solid,
+    /// Whether an equilibrium is between a species and other uncharged ones without water.
+    Isomerises,
+    /// Whether the equilibria that have a species say nothing of their heat.
+    LacksHeat,
     /// The solids that dissolve as a species whole.
     SolidsOf,
     /// The heat that a mole of such a solid takes up as it dissolves.
@@ -144,6 +148,8 @@ const TABLE: &[(&str, Bound)] = &[
     ("balanced", Bound::Balanced),
     ("settles", Bound::Settles),
     ("is_solid", Bound::Solid),
+    ("isomerises", Bound::Isomerises),
+    ("lacks_heat", Bound::LacksHeat),
     ("solids_of", Bound::SolidsOf),
     ("heat_of_solid", Bound::HeatOfSolid),
     ("put_in", Bound::Put),
@@ -356,6 +362,14 @@ impl Elaborator<'_> {
             (Bound::Solid, [Value::Species(s)]) => {
                 let is_solid = self.is_solid(*s);
                 self.certain(is_solid)
+            }
+            (Bound::Isomerises, [Value::Species(s)]) => {
+                let does = self.isomerises(*s);
+                self.certain(does)
+            }
+            (Bound::LacksHeat, [Value::Species(s)]) => {
+                let lacks = self.lacks_heat(*s);
+                self.certain(lacks)
             }
             (Bound::SolidsOf, [Value::Species(s)]) => {
                 let solids = self.tables.equilibria.iter().filter_map(|e| e.dissolving_whole(|_, other| other == *s));

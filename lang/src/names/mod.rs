@@ -365,6 +365,17 @@ impl<'a> Names<'a> {
             return near::proposed(d, &near::nearest(&name.text, candidates), name.span);
         }
         let near = kin::near_species(&name.text, candidates);
-        self.with_kin(module, name, d).unwrap_or_else(|d| near::proposed(*d, &near, name.span))
+        self.with_kin(module, name, d).unwrap_or_else(|d| match near.is_empty() {
+            true => {
+                let formula = match name.text.chars().last() {
+                    Some('-') => "C7H5O2-",
+                    Some('+') => "C7H7O2+",
+                    _ => "C7H6O2",
+                };
+                let fields = format!("formula: \"{formula}\", molar_volume: 100 mL/mol, heat_capacity: 150 J/(mol*K)");
+                d.help(format!("declare it, with numbers of its own: `species {} {{ {fields} }}`", name.text))
+            }
+            false => near::proposed(*d, &near, name.span),
+        })
     }
 }

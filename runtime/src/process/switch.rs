@@ -299,7 +299,7 @@ impl Switches {
                 // The polynomial through the points is not a curved side itself, nor a state that has died out.
                 path(after, moving);
                 self.run(after, moving);
-                if !self.is_changed(i, if self.straight[i] { 0.0 } else { self.apart[i].noise }) {
+                if !(if self.straight[i] { self.is_changed(i) } else { self.is_clearly_changed(i) }) {
                     continue;
                 }
                 located.push((self.locate(i, before, after, moving, path), i));
@@ -349,8 +349,7 @@ impl Switches {
                     Is::Compared { .. } => left - right,
                     Is::Whole(number) => left - number,
                 };
-                let (larger, smaller) = sides(&self.tape, &self.sizes, i);
-                let noise = NOISE * larger.max(smaller);
+                let noise = self.noise(i);
                 apart.noise = apart.noise.max(noise);
                 // What is so at the start has been seen before.
                 apart.changed[k] = k > 0 && self.list[i].clearly_changed(left, right, noise);
@@ -416,7 +415,7 @@ impl Switches {
                 path(middle, moving);
                 self.run(middle, moving);
                 next.push((from, middle));
-                if self.is_changed(i, self.apart[i].noise) {
+                if self.is_clearly_changed(i) {
                     // What comes later does not matter any more.
                     seen = Some((from, middle));
                     break;
@@ -441,10 +440,26 @@ impl Switches {
         self.list[list[place]].stays(left, right)
     }
 
-    /// Whether switch `i` has changed by more than `noise`, or at all where that is 0, after [`Switches::run`].
-    fn is_changed(&self, i: usize, noise: f64) -> bool {
+    /// Whether switch `i` has changed, after [`Switches::run`].
+    fn is_changed(&self, i: usize) -> bool {
         let (left, right) = self.sides(i);
-        if noise > 0.0 { self.list[i].clearly_changed(left, right, noise) } else { self.list[i].changed(left, right) }
+        self.list[i].changed(left, right)
+    }
+
+    /// The same by more than rounding makes of its sides.
+    fn is_clearly_changed(&mut self, i: usize) -> bool {
+        if !self.is_changed(i) {
+            return false;
+        }
+        self.tape.sizes(&self.registers, &mut self.sizes);
+        let (left, right) = self.sides(i);
+        self.list[i].clearly_changed(left, right, self.noise(i))
+    }
+
+    /// What the sides of switch `i` are off by through rounding, by the sizes of what they are made of.
+    fn noise(&self, i: usize) -> f64 {
+        let (left, right) = sides(&self.tape, &self.sizes, i);
+        NOISE * left.max(right)
     }
 
     /// Bisects to the first instant after `low` at which switch `i` has changed, as it has at `high`.
@@ -460,7 +475,7 @@ impl Switches {
             let middle = low + 0.5 * (high - low);
             path(middle, moving);
             self.run(middle, moving);
-            if self.is_changed(i, 0.0) {
+            if self.is_changed(i) {
                 high = middle;
             } else {
                 low = middle;
@@ -481,7 +496,7 @@ impl Switches {
         let later = (time + 8.0 * rounding(time)).min(limit);
         path(later, moving);
         self.run(later, moving);
-        if self.is_changed(i, 0.0) { later } else { time }
+        if self.is_changed(i) { later } else { time }
     }
 }
 

@@ -162,6 +162,11 @@ impl Basis {
         Ok(basis.complete())
     }
 
+    /// Whether a member is made of many of one master.
+    pub(super) fn is_steep_member(&self, i: usize) -> bool {
+        self.of[i].iter().any(|part| part.abs() > STEEP)
+    }
+
     /// With what follows from the rest.
     fn complete(mut self) -> Basis {
         let makes = |c: usize| self.of.iter().filter(|of| of[c] != 0.0).count();

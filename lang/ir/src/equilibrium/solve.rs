@@ -29,6 +29,11 @@ const HALVINGS: usize = 40;
 /// So far apart are temperatures that are tried one after the other, K.
 const WALK: f64 = 10.0;
 
+/// What members that hold many of a master are first hindered by in the logarithm of their constants, and how fast that goes.
+const HINDERED: f64 = 400.0;
+const HINDERED_STEP: f64 = 50.0;
+const LEAST_STEP: f64 = 0.01;
+
 /// A solid is above its constant by this much of a logarithm before it counts.
 const SATURATED: f64 = 1e-10;
 
@@ -117,7 +122,8 @@ fn solve_in_order(system: &System, args: &[f64], as_numbered: bool) -> Option<So
     }
     let found = follow(&free, &start, &lacking, given);
     let found = found.or_else(|| follow(&free, &start, &lacking, Vec::new()));
-    found.or_else(|| by_temperature(&free, &lacking))
+    let found = found.or_else(|| by_temperature(&free, &lacking));
+    found.or_else(|| by_constants(&free, &start, &lacking))
 }
 
 /// Whether some temperature has the heat content that is given. One that may be far outside is asked for at both ends, which is two
@@ -189,6 +195,44 @@ fn by_temperature(free: &Problem<'_>, lacking: &[f64]) -> Option<Solution> {
     let Solution { activities, point: Some(point), .. } = last? else { return None };
     let start = point.unknowns(free.basis.masters.iter().map(|i| activities[*i]));
     follow(free, &start, lacking, point.basis.held.clone())
+}
+
+/// The solution where members hold many of a master, and form all at once as it grows: first without them, and then with constants that
+/// come nearer and nearer to their own.
+fn by_constants(free: &Problem<'_>, start: &[f64], lacking: &[f64]) -> Option<Solution> {
+    let alone = alone(free);
+    if alone.is_empty() {
+        return None;
+    }
+    let mut args = free.args.to_vec();
+    let mut at = |shift: f64, start: &[f64], held: Vec<usize>| {
+        for &(r, count) in &alone {
+            args[free.layout.constant(r)] = free.args[free.layout.constant(r)] - shift / count;
+        }
+        follow(&Problem { args: &args, ..free.clone() }, start, lacking, held)
+    };
+    let mut last = at(HINDERED, start, Vec::new())?;
+    let (mut shift, mut step) = (HINDERED, HINDERED_STEP);
+    while shift > 0.0 {
+        let Solution { activities, point: Some(point), .. } = &last else { return None };
+        let next = (shift - step).max(0.0);
+        let near = point.unknowns(free.basis.masters.iter().map(|i| activities[*i]));
+        match at(next, &near, point.basis.held.clone()) {
+            Some(found) => (last, shift, step) = (found, next, 1.5 * step),
+            None if step > LEAST_STEP => step *= 0.5,
+            None => return None,
+        }
+    }
+    Some(last)
+}
+
+/// The equations that form members which hold many of a master, and no others, with how often each is taken.
+fn alone(free: &Problem<'_>) -> Vec<(usize, f64)> {
+    let basis = &free.system.basis;
+    let forms_others =
+        |r: usize, i: usize| (0..basis.by.len()).any(|j| j != i && basis.by[j].iter().any(|(k, _)| *k == r));
+    let steep = basis.solutes.iter().copied().filter(|i| basis.is_steep_member(*i));
+    steep.filter_map(|i| basis.by[i].iter().copied().find(|(r, _)| !forms_others(*r, i))).collect()
 }
 
 /// Lets solids come and go until none has to.

@@ -297,15 +297,19 @@ impl Walk<'_, '_> {
 
     /// What is so, in the words of a hazard: of the first that it asks about and that is so.
     fn worded(&self, hazard: &Hazard, world: &MixtureState) -> Option<String> {
+        self.all_words(hazard, world).next()
+    }
+
+    /// The same of all that are so.
+    fn all_words<'s>(&'s self, hazard: &'s Hazard, world: &'s MixtureState) -> impl Iterator<Item = String> + 's {
         let is_so = |said: &&Said| self.eyes.nominal_truth(said.node, world) == Some(true);
-        let Said { text, .. } = hazard.said.iter().find(is_so)?;
         let lab = self.eyes.lab;
         let value = |node| {
             let value = self.eyes.value(node, world);
             Ok::<_, Infallible>(Some(value).filter(|v| v.is_finite()))
         };
         let instance = |at: f64| lab.instances.get(at as usize).map_or("nothing", |i| i.name.as_str()).to_string();
-        text.show(value, instance).ok()
+        hazard.said.iter().filter(is_so).filter_map(move |Said { text, .. }| text.show(value, instance).ok())
     }
 
     fn hazard(
@@ -316,6 +320,10 @@ impl Walk<'_, '_> {
         (place, said): (Span, &str),
     ) -> Diagnostic {
         let in_words = words.is_some();
+        let others: Vec<String> = match &words {
+            Some(first) => self.all_words(hazard, world).filter(|other| other != first).take(MOST_THINGS).collect(),
+            None => Vec::new(),
+        };
         let headline = words.unwrap_or_else(|| hazard.headline());
         let mut d = Diagnostic::error(hazard.code(), place, headline, said);
         d.severity = hazard.severity();
@@ -336,6 +344,9 @@ impl Walk<'_, '_> {
             {
                 d = d.help(format!("`{}` is {}", term.name, unit.show(value)));
             }
+        }
+        for other in others {
+            d = d.help(format!("also: {other}"));
         }
         if let Some(help) = &hazard.help {
             d = d.help(help.clone());
