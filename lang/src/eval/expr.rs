@@ -575,7 +575,7 @@ impl<'a> Elaborator<'a> {
             self.report(d.help(format!("use {}", known.join(", "))));
             return Value::Error;
         }
-        if items.is_empty() && self.prototype && self.observed.is_some() {
+        if items.is_empty() && self.prototype && self.noting() == Noting::Any {
             // A stand-in has none of these: what is said of one is checked with nothing known of it.
             scope.bind(var.text.clone(), Value::Error);
             let none = Value::Bool(self.graph.number(0.0));

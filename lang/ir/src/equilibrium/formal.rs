@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::problem::Problem;
-use super::solve::{Solution, solve};
+use super::solve::{Solution, solve_within};
 use super::{Layout, Phase, System, Written};
 
 /// Between which logarithms of an activity a solution is sought, and how often that is halved before Newton's method goes on,
@@ -103,7 +103,9 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
     let lacking = free.lacking();
     let binds = |i: usize| i != rest.member && basis.of[i][c] != 0.0 && free.may_be(i, &lacking);
     if !(0..basis.of.len()).any(binds) {
-        let open = |activity: f64| rest.at_limit(free, &solve(&rest.system, &rest.args(free, activity))?, activity);
+        let open = |activity: f64| {
+            rest.at_limit(free, &solve_within(&rest.system, &rest.args(free, activity), free.budget)?, activity)
+        };
         return OPEN.into_iter().find_map(open);
     }
     let bound = |of: &dyn Fn(usize) -> f64| (0..basis.of.len()).map(|i| basis.of[i][c] * of(i)).sum::<f64>();
@@ -115,24 +117,31 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
         (bound(&at) - wanted, ROUNDED * all)
     };
     let (mut low, mut high) = ACTIVITIES;
-    let mut is_flat = false;
+    let mut flat: Option<(f64, Solution)> = None;
     let mut last: Option<(f64, Solution)> = None;
     for _ in 0..halvings {
         let middle = 0.5 * (low + high);
-        let solution = solve(&rest.system, &rest.args(free, middle))?;
+        let solution = solve_within(&rest.system, &rest.args(free, middle), free.budget)?;
         let (excess, rounded) = excess(&solution);
-        is_flat |= excess.abs() <= rounded;
+        if excess.abs() <= rounded {
+            flat.get_or_insert((middle, solution.clone()));
+        }
         *(if excess < 0.0 { &mut low } else { &mut high }) = middle;
         last = Some((middle, solution));
     }
     // Where rounding hides what the activity changes, or the bracket ends where it began, nothing may be left that binds more, or gives any.
-    let is_at_end = is_flat || low == ACTIVITIES.0 || high == ACTIVITIES.1;
+    let is_at_end = flat.is_some() || low == ACTIVITIES.0 || high == ACTIVITIES.1;
     for (limit, sign) in [(ACTIVITIES.0, 1.0), (ACTIVITIES.1, -1.0)].into_iter().filter(|_| is_at_end) {
-        let solution = solve(&rest.system, &rest.args(free, limit))?;
+        let solution = solve_within(&rest.system, &rest.args(free, limit), free.budget)?;
         let (excess, rounded) = excess(&solution);
         if sign * excess >= -rounded {
             return rest.at_limit(free, &solution, limit);
         }
+    }
+    // Where rounding hides it over a stretch, the first place that was met there stands for all: it is the same for mixtures that are nearly
+    // the same.
+    if let Some((activity, solution)) = flat {
+        return rest.at_limit(free, &solution, activity);
     }
     let (activity, solution) = last?;
     let (start, held) = rest.begin(free, &solution, activity)?;

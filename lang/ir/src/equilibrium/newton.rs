@@ -68,6 +68,9 @@ impl Problem<'_> {
         let mut factors = self.linear();
         let (mut right, mut step) = (Vec::new(), Vec::new());
         for count in 0..MOST_STEPS {
+            if !self.budget.spend() {
+                return None;
+            }
             let off = largest(&state.residuals);
             if !off.is_finite() {
                 break;

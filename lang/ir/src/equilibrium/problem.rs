@@ -1,5 +1,6 @@
 //! A system with its arguments, seen by a basis: what is given, what no equation changes, and where a solution is sought from.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use super::activity::{Activities, Coefficients};
@@ -87,12 +88,33 @@ pub(super) struct Problem<'a> {
     pub(super) limit: f64,
     /// Whether the linear system is eliminated in the order of members, and not in that of masters.
     pub(super) as_numbered: bool,
+    /// What may still be spent on a solution.
+    pub(super) budget: &'a Budget,
+}
+
+/// How many steps of Newton's method may still be taken. What is hard to find is sought from many starts, each of them by solutions of its
+/// own, and what has no solution would be sought without end.
+#[derive(Debug)]
+pub(super) struct Budget(Cell<u32>);
+
+impl Budget {
+    /// So many steps.
+    pub(super) fn of(steps: u32) -> Budget {
+        Budget(Cell::new(steps))
+    }
+
+    /// Takes one step; false where none is left.
+    pub(super) fn spend(&self) -> bool {
+        let left = self.0.get();
+        self.0.set(left.saturating_sub(1));
+        left > 0
+    }
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(system: &'a System, args: &'a [f64], basis: Arc<Basis>) -> Self {
+    pub(super) fn new(system: &'a System, args: &'a [f64], basis: Arc<Basis>, budget: &'a Budget) -> Self {
         let (layout, activities) = (system.layout(), Activities::of(args));
-        Problem { system, args, layout, activities, basis, limit: 0.0, as_numbered: false }
+        Problem { system, args, layout, activities, basis, limit: 0.0, as_numbered: false, budget }
     }
 
     /// A linear system that is still to be filled in.

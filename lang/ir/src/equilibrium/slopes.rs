@@ -3,7 +3,7 @@
 use super::basis::Basis;
 use super::linear::Factors;
 use super::pitzer::{Turn, Virial};
-use super::problem::Problem;
+use super::problem::{Budget, Problem};
 use super::solve::{Point, STANDARD, Solution, terms};
 use super::{Part, Phase, Role, System};
 
@@ -34,7 +34,8 @@ impl Slopes {
     /// The slope of a part by an argument.
     pub(super) fn of(&mut self, system: &System, solution: &Solution, args: &[f64], part: Part, arg: usize) -> f64 {
         let basis = solution.point.as_ref().map_or(&system.basis, |point| &point.basis);
-        let problem = Problem::new(system, args, basis.clone());
+        let budget = Budget::of(0);
+        let problem = Problem::new(system, args, basis.clone(), &budget);
         let Some(point) = &solution.point else { return as_given(&problem, part, arg) };
         if self.known.len() != args.len() {
             self.known = vec![None; args.len()];

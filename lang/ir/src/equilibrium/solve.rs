@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::basis::Basis;
 use super::formal::Begin;
 use super::linear::Factors;
-use super::problem::{Problem, TEMPERATURES, TRACE, Totals};
+use super::problem::{Budget, Problem, TEMPERATURES, TRACE, Totals};
 use super::state::State;
 use super::{Layout, System, formal, memo};
 use crate::math;
@@ -22,6 +22,9 @@ pub const STANDARD: f64 = 298.15;
 
 /// What no equation changes is kept to this share of its largest part, or there is no solution.
 const KEPT: f64 = 1e-9;
+
+/// Steps of Newton's method that are taken for one solution at most: most take 20, the hardest of 100,000 random ones BUDGETED.
+const MOST_STEPS: u32 = 20_000;
 
 /// How often a temperature is halved that is hard to find.
 const HALVINGS: usize = 40;
@@ -89,14 +92,19 @@ pub fn rises(t: f64) -> [f64; Layout::TERMS] {
 /// The solution of a system for its arguments. Where half-cells leave the potential open it is rounding that leads there or astray: what is
 /// not found is sought once more with the linear system eliminated in another order.
 pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
-    [false, true].into_iter().find_map(|as_numbered| solve_in_order(system, args, as_numbered))
+    solve_within(system, args, &Budget::of(MOST_STEPS))
 }
 
-fn solve_in_order(system: &System, args: &[f64], as_numbered: bool) -> Option<Solution> {
+/// The same by what is left of a budget.
+pub(super) fn solve_within(system: &System, args: &[f64], budget: &Budget) -> Option<Solution> {
+    [false, true].into_iter().find_map(|as_numbered| solve_in_order(system, args, as_numbered, budget))
+}
+
+fn solve_in_order(system: &System, args: &[f64], as_numbered: bool, budget: &Budget) -> Option<Solution> {
     if args.len() != system.layout().count() || args.iter().any(|v| v.is_nan()) {
         return None;
     }
-    let free = Problem { as_numbered, ..Problem::new(system, args, system.basis.clone()) };
+    let free = Problem { as_numbered, ..Problem::new(system, args, system.basis.clone(), budget) };
     let lacking = free.lacking();
     let totals = free.totals(&lacking);
     // What could become solvent is none: dry hydroxide holds no water to be dissolved in.
@@ -169,7 +177,7 @@ fn held_at(free: &Problem<'_>, temperature: f64) -> Option<(f64, Solution)> {
     let mut args = free.args.to_vec();
     (args[layout.capacity()], args[layout.heat()]) = (f64::INFINITY, 0.0);
     args[layout.reference()] = temperature;
-    let solution = solve_in_order(free.system, &args, free.as_numbered)?;
+    let solution = solve_in_order(free.system, &args, free.as_numbered, free.budget)?;
     let capacity = free.args[layout.capacity()] + solution.capacity;
     Some((solution.heat + capacity * (temperature - free.reference()), solution))
 }
@@ -237,7 +245,7 @@ fn alone(free: &Problem<'_>) -> Vec<(usize, f64)> {
 
 /// Lets solids come and go until none has to.
 fn follow(free: &Problem<'_>, start: &[f64], lacking: &[f64], mut held: Vec<usize>) -> Option<Solution> {
-    let (system, args) = (free.system, free.args);
+    let system = free.system;
     let solids = &system.basis.solids;
     let mut known: Vec<f64> = vec![0.0; system.members().len()];
     for (c, i) in system.basis.masters.iter().enumerate() {
@@ -247,8 +255,7 @@ fn follow(free: &Problem<'_>, start: &[f64], lacking: &[f64], mut held: Vec<usiz
     for _ in 0..4 * solids.len() + 4 {
         let seek = |replaced: &[usize]| {
             let basis = memo::basis(system, &held, replaced)?;
-            let Problem { limit, as_numbered, .. } = *free;
-            let problem = Problem { limit, as_numbered, ..Problem::new(system, args, basis) };
+            let problem = Problem { basis, ..free.clone() };
             let totals = problem.totals(lacking);
             let begin = problem.basis.masters.iter().map(|i| known[*i]).chain(others.iter().copied()).collect();
             problem.newton(begin, &totals).map(|(x, state)| (problem, totals, x, state))

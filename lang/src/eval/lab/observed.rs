@@ -81,9 +81,9 @@ impl<'a> Elaborator<'a> {
             _ => None,
         };
         let is_inner = !self.open_calls.is_empty() || !self.open_members.is_empty();
-        // What holds of a stand-in says nothing of the things that a lab has.
-        let constant = node.filter(|_| !self.prototype).and_then(|node| self.graph.constant(node));
-        let decided = constant.map(|value| value != 0.0);
+        let decided = node.and_then(|node| self.graph.constant(node)).map(|value| value != 0.0);
+        // What does not hold of a stand-in says nothing of the things that a lab has.
+        let is_ruled_out = decided == Some(false) && !self.prototype;
         let Some(observed) = &mut self.observed else { return value };
         if let Some(each) = each {
             observed.compared.iter_mut().skip(compared).for_each(|c| c.each.push(each));
@@ -91,7 +91,7 @@ impl<'a> Elaborator<'a> {
         let decides = match noting {
             Noting::Nothing => false,
             Noting::All => fold.text == "all" && decided != Some(true),
-            Noting::Any => fold.text == "any" && decided != Some(false),
+            Noting::Any => fold.text == "any" && !is_ruled_out,
         };
         // The innermost of several, as all is bound there.
         if let Some(node) = node.filter(|_| decides && !is_inner && observed.bound.len() == bound) {

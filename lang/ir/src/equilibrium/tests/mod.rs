@@ -189,7 +189,8 @@ fn random(seed: u64) -> Mixture {
 fn random_mixtures_are_all_solved() {
     for seed in 0..1_000 {
         let mixture = random(seed);
-        let problem = problem::Problem::new(&mixture.system, &mixture.args, mixture.system.basis.clone());
+        let budget = problem::Budget::of(0);
+        let problem = problem::Problem::new(&mixture.system, &mixture.args, mixture.system.basis.clone(), &budget);
         let solution = solve::solve(&mixture.system, &mixture.args)
             .unwrap_or_else(|| panic!("mixture {seed}: {:?}", mixture.args));
         let point = solution.point.as_ref().unwrap();
