@@ -95,8 +95,12 @@ impl Rest {
     }
 }
 
-/// Where to begin; none where there is no formal member.
-pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
+/// Where to begin, first and then; nowhere where there is no formal member.
+pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Vec<Begin> {
+    starts(free, halvings).unwrap_or_default()
+}
+
+fn starts(free: &Problem<'_>, halvings: usize) -> Option<Vec<Begin>> {
     let rest = free.system.rest.as_ref()?;
     let basis = &free.basis;
     let c = basis.masters.iter().position(|i| *i == rest.member)?;
@@ -106,7 +110,7 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
         let open = |activity: f64| {
             rest.at_limit(free, &solve_within(&rest.system, &rest.args(free, activity), free.budget)?, activity)
         };
-        return OPEN.into_iter().find_map(open);
+        return OPEN.into_iter().find_map(open).map(|begin| vec![begin]);
     }
     let bound = |of: &dyn Fn(usize) -> f64| (0..basis.of.len()).map(|i| basis.of[i][c] * of(i)).sum::<f64>();
     let wanted = bound(&|i| free.given(i));
@@ -135,15 +139,13 @@ pub(super) fn bracketed(free: &Problem<'_>, halvings: usize) -> Option<Begin> {
         let solution = solve_within(&rest.system, &rest.args(free, limit), free.budget)?;
         let (excess, rounded) = excess(&solution);
         if sign * excess >= -rounded {
-            return rest.at_limit(free, &solution, limit);
+            return rest.at_limit(free, &solution, limit).map(|begin| vec![begin]);
         }
     }
     // Where rounding hides it over a stretch, the first place that was met there stands for all: it is the same for mixtures that are nearly
     // the same.
-    if let Some((activity, solution)) = flat {
-        return rest.at_limit(free, &solution, activity);
-    }
+    let settled = flat.and_then(|(activity, solution)| rest.at_limit(free, &solution, activity));
     let (activity, solution) = last?;
-    let (start, held) = rest.begin(free, &solution, activity)?;
-    Some(Begin::Near(start, held))
+    let near = rest.begin(free, &solution, activity).map(|(start, held)| Begin::Near(start, held));
+    Some(settled.into_iter().chain(near).collect())
 }

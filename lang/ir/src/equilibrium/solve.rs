@@ -24,7 +24,7 @@ pub const STANDARD: f64 = 298.15;
 const KEPT: f64 = 1e-9;
 
 /// Steps of Newton's method that are taken for one solution at most: most take 20, the hardest of 100,000 random ones BUDGETED.
-const MOST_STEPS: u32 = 20_000;
+const MOST_STEPS: u32 = 200_000;
 
 /// How often a temperature is halved that is hard to find.
 const HALVINGS: usize = 40;
@@ -121,10 +121,11 @@ fn solve_in_order(system: &System, args: &[f64], as_numbered: bool, budget: &Bud
         return None;
     }
     let start = free.start(&totals);
-    let bracketed = |halvings| match formal::bracketed(&free, halvings)? {
+    let from = |begin| match begin {
         Begin::Near(start, held) => follow(&free, &start, &lacking, held),
         Begin::AtLimit(start, held, limit) => follow(&Problem { limit, ..free.clone() }, &start, &lacking, held),
     };
+    let bracketed = |halvings| formal::bracketed(&free, halvings).into_iter().find_map(from);
     if let Some(found) = formal::HALVINGS.into_iter().find_map(bracketed) {
         return Some(found);
     }
