@@ -261,9 +261,9 @@ fn a_formula_is_answered_by_the_substance_that_has_it() {
     // Isomers are all named.
     let isomers = told("C3H8O");
     assert!(isomers.contains("`iPrOH`") && isomers.contains("`use std::substances::"), "{isomers}");
-    // A salt that there is not is written as its ions.
-    let ions = told("RbBr");
-    assert!(!ions.contains("help"), "{ions}");
+    // What there is not is declared; a salt of known ions is written as these.
+    let salt = told("RbBr");
+    assert!(salt.contains("declare it, with numbers of its own: `species RbBr { formula: \"RbBr\""), "{salt}");
     let ions = told("NH4OH");
     assert!(ions.contains("write its ions, per mole 1 mol of `NH4+` and 1 mol of `OH-`"), "{ions}");
     // Letters decide where a formula was misread, or the elements are the same.

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use matterix_ir::{Diagnostic, FileId, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
+use crate::chem::formula::Formula;
 use crate::{library, near};
 
 pub(crate) use mentioned::{bare, names_in, names_of};
@@ -368,6 +369,7 @@ impl<'a> Names<'a> {
         self.with_kin(module, name, d).unwrap_or_else(|d| match near.is_empty() {
             true => {
                 let formula = match name.text.chars().last() {
+                    _ if Formula::parse(&name.text).is_ok() => name.text.as_str(),
                     Some('-') => "C7H5O2-",
                     Some('+') => "C7H7O2+",
                     _ => "C7H6O2",

@@ -143,7 +143,8 @@ impl Switch {
             Is::Whole(number) if left < number => left - number,
             Is::Whole(number) => left - (number + 1.0),
         };
-        self.changed(left, right) && !(apart.abs() <= noise)
+        let is_noise = apart.abs() <= noise;
+        self.changed(left, right) && !is_noise
     }
 }
 

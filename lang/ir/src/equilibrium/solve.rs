@@ -23,7 +23,8 @@ pub const STANDARD: f64 = 298.15;
 /// What no equation changes is kept to this share of its largest part, or there is no solution.
 const KEPT: f64 = 1e-9;
 
-/// Steps of Newton's method that are taken for one solution at most: most take 20, the hardest of 100,000 random ones BUDGETED.
+/// Steps of Newton's method that are taken for one solution at most. Most take 20, with half-cells 300; of 2,000 random mixtures with half-cells
+/// 6 took more than 20,000.
 const MOST_STEPS: u32 = 200_000;
 
 /// How often a temperature is halved that is hard to find.
