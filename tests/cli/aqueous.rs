@@ -128,38 +128,12 @@ fn heat_of_what_dissolves_whole_is_told_by_its_name() {
 
 #[test]
 fn a_dry_acid_is_as_warm_as_its_solid() {
-    let dir = folder("dry_acid");
     // Little of benzoic acid dissolves: what stays solid neither warms nor cools, whichever of the two species was weighed.
-    let text = |weighed: &str| {
-        format!(
-            "mtx 1
-use std::equilibria
-use std::acids
-use std::glassware::Beaker250mL
-extern skill weigh_out(m: Mass) from(source: Vessel) into(target: Vessel)
-    takes 1 s
-    effect move(m, from: source, to: target)
-asset Cup: Beaker250mL {{ contents: {{ air: 0 W/K }}, wall: 0 W/K }}
-lab bench {{
-    ambient: 25 degC
-    jar = Cup at (0, 0, 0) m holding 20 g of {weighed}
-    cup = Cup at (1, 0, 0) m holding 100 g of water
-}}
-workflow go in bench {{
-    weigh_out 20 g from jar into cup
-    wait 10 ms
-    note \"cools by {{25 degC - cup.contents.temperature as K :.3}}\"
-}}
-"
-        )
+    let cools = |name: &str, weighed_in: &str| {
+        let uses = "use std::equilibria\nuse std::acids";
+        25.0 - weighed(name, uses, &format!("20 g of {weighed_in}"), "100 g of water").1
     };
-    let cools = |name: &str, weighed: &str| {
-        write(&dir, name, text(weighed));
-        let out = matterixc_in(&dir, &["run", name]).out;
-        let (_, said) = out.rsplit_once("cools by ").expect("the note is told");
-        said.split_whitespace().next().and_then(|word| word.parse::<f64>().ok()).expect("a number")
-    };
-    let (acid, solid) = (cools("acid.mtx", "benzoic_acid"), cools("solid.mtx", "benzoic_acid(s)"));
+    let (acid, solid) = (cools("dry_acid", "benzoic_acid"), cools("dry_solid", "benzoic_acid(s)"));
     assert!((acid - solid).abs() < 0.002, "{acid} against {solid}");
     // 3.6 mmol dissolve, with some 20 kJ/mol.
     assert!(acid > 0.1 && acid < 0.25, "{acid}");
