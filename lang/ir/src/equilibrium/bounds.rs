@@ -10,8 +10,10 @@ use crate::interval::{ALL, Interval};
 /// Beyond these times what the slopes say, nothing within narrow bounds is taken to lie.
 const MARGIN: f64 = 2.0;
 
-/// Into so many stretches of temperature bounds are cut.
+/// Into so many stretches of temperature bounds are cut at most, none of them narrower than this, K: within a degree no constant changes so
+/// much that slopes at three points would not show it.
 const STRETCHES: usize = 8;
+const STRETCH: f64 = 1.0;
 
 impl System {
     /// Bounds of a part for all arguments within bounds.
@@ -72,9 +74,10 @@ impl System {
         }
         let mut args = args.to_vec();
         (args[layout.heat()], args[layout.capacity()]) = ((0.0, 0.0), (f64::INFINITY, f64::INFINITY));
-        let step = (high - low) / STRETCHES as f64;
+        let stretches = (((high - low) / STRETCH).ceil() as usize).clamp(1, STRETCHES);
+        let step = (high - low) / stretches as f64;
         let mut hull = (f64::INFINITY, f64::NEG_INFINITY);
-        for stretch in 0..STRETCHES {
+        for stretch in 0..stretches {
             let from = low + step * stretch as f64;
             args[layout.reference()] = (from, from + step);
             let (least, most) = self.bounds_nearby(part, &args);

@@ -1,7 +1,7 @@
 //! The last solutions of this thread: the numbers of one mixture are asked for one after the other.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use super::basis::Basis;
@@ -9,8 +9,11 @@ use super::slopes::Slopes;
 use super::solve::{self, Solution};
 use super::{Interaction, System, Written};
 
-/// So many solutions are kept. Which ones changes no result.
-const KEPT: usize = 256;
+/// Solutions are kept in so many groups, by a hash of the system and the arguments. What is kept changes no result.
+const GROUPS: usize = 64;
+
+/// So many are kept in each, those asked for last: an integrator asks for a few again and again, of which two may share a group.
+const KEPT: usize = 4;
 
 /// So many bases are kept.
 const BASES_KEPT: usize = 1024;
@@ -27,7 +30,7 @@ struct Entry {
 
 thread_local! {
     static BASES: RefCell<BTreeMap<Held, Option<Arc<Basis>>>> = const { RefCell::new(BTreeMap::new()) };
-    static LAST: RefCell<Vec<Option<Entry>>> = const { RefCell::new(Vec::new()) };
+    static LAST: RefCell<Vec<VecDeque<Entry>>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Numbers mixed into one.
@@ -74,24 +77,22 @@ pub(super) fn basis(system: &System, held: &[usize], replaced: &[usize]) -> Opti
 }
 
 fn entry<R>(system: &System, args: &[f64], work: impl FnOnce(&mut Entry) -> R) -> R {
-    let place = mixed(system.fingerprint, args.iter().map(|a| a.to_bits())) as usize % KEPT;
-    LAST.with_borrow_mut(|last| {
-        if last.is_empty() {
-            last.resize_with(KEPT, || None);
-        }
-        let is_same = |known: &Entry| {
-            let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
-            let agrees = || known.args.iter().zip(args).all(is_same);
-            known.system == system.fingerprint && known.args.len() == args.len() && agrees()
-        };
-        let known = last[place].take().filter(is_same);
-        let known = last[place].insert(known.unwrap_or_else(|| Entry {
+    let group = mixed(system.fingerprint, args.iter().map(|a| a.to_bits())) as usize % GROUPS;
+    LAST.with_borrow_mut(|groups| {
+        groups.resize_with(GROUPS, VecDeque::new);
+        let group = &mut groups[group];
+        let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        let agrees = |known: &Entry| known.args.len() == args.len() && known.args.iter().zip(args).all(is_same);
+        let place = group.iter().position(|known| known.system == system.fingerprint && agrees(known));
+        let known = place.and_then(|place| group.remove(place)).unwrap_or_else(|| Entry {
             system: system.fingerprint,
             args: args.to_vec(),
             solution: solve::solve(system, args),
             slopes: Slopes::default(),
-        }));
-        work(known)
+        });
+        group.push_front(known);
+        group.truncate(KEPT);
+        work(&mut group[0])
     })
 }
 

@@ -194,6 +194,13 @@ impl<'a> Problem<'a> {
         lacking
     }
 
+    /// The masters of which there is none at all.
+    pub(super) fn missing<'l>(&'l self, lacking: &'l [f64]) -> impl Iterator<Item = usize> + 'l {
+        let basis = &self.basis;
+        let total = |c: usize| (0..basis.of.len()).map(|i| basis.of[i][c] * self.given(i)).sum::<f64>();
+        (0..basis.masters.len()).filter(move |c| lacking[basis.masters[*c]] != 0.0 && total(*c) == 0.0)
+    }
+
     /// Whether there is enough of everything that a solid is made of.
     pub(super) fn may_be(&self, solid: usize, lacking: &[f64]) -> bool {
         self.masters_of(solid).iter().all(|(c, _)| lacking[self.basis.masters[*c]] == 0.0)
@@ -202,11 +209,24 @@ impl<'a> Problem<'a> {
     /// For each solid, one of its parts, so that there is little of all of them: its amount is known by that to the last digit. Of the
     /// ways to give each one a part of its own it is that whose largest total is least.
     pub(super) fn scarcest(&self, held: &[usize]) -> Vec<usize> {
+        let totals = self.totals(&vec![0.0; self.basis.of.len()]).of;
+        self.ranked(held, |c, of| if self.basis.is_matter[c] { totals[c] / of } else { f64::INFINITY })
+    }
+
+    /// The same by how much is dissolved of each part: a hydroxide that hardly comes out of much metal is known by the acid it sets free.
+    pub(super) fn scarcest_dissolved(&self, held: &[usize], amounts: &[f64]) -> Vec<usize> {
+        let part = |i: usize, c: usize| (self.basis.of[i][c] * amounts[i]).abs();
+        let of_all = |c: usize| self.basis.solutes.iter().map(|i| part(*i, c)).fold(0.0, f64::max);
+        let most: Vec<f64> = (0..self.basis.masters.len()).map(of_all).collect();
+        self.ranked(held, |c, of| most[c] / of.abs())
+    }
+
+    /// For each solid, one of its parts, each another one, so that the largest rank is least.
+    fn ranked(&self, held: &[usize], rank: impl Fn(usize, f64) -> f64) -> Vec<usize> {
         if held.is_empty() {
             return Vec::new();
         }
-        let totals = self.totals(&vec![0.0; self.basis.of.len()]).of;
-        let rank = |(c, of): &(usize, f64)| if self.basis.is_matter[*c] { totals[*c] / of } else { f64::INFINITY };
+        let rank = |(c, of): &(usize, f64)| rank(*c, *of);
         let choices: Vec<Vec<(usize, f64)>> = held
             .iter()
             .map(|solid| {

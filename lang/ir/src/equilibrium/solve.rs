@@ -255,14 +255,15 @@ fn follow(free: &Problem<'_>, start: &[f64], lacking: &[f64], mut held: Vec<usiz
     }
     let mut others = start[system.basis.masters.len()..].to_vec();
     for _ in 0..4 * solids.len() + 4 {
-        let seek = |replaced: &[usize]| {
+        let seek = |replaced: &[usize], known: &[f64], others: &[f64]| {
             let basis = memo::basis(system, &held, replaced)?;
             let problem = Problem { basis, ..free.clone() };
             let totals = problem.totals(lacking);
             let begin = problem.basis.masters.iter().map(|i| known[*i]).chain(others.iter().copied()).collect();
             problem.newton(begin, &totals).map(|(x, state)| (problem, totals, x, state))
         };
-        let (problem, totals, x, state) = seek(&free.scarcest(&held))?;
+        let replaced = free.scarcest(&held);
+        let (problem, totals, x, state) = seek(&replaced, &known, &others)?;
         for &i in problem.basis.solutes.iter().chain(&problem.basis.formal) {
             known[i] = problem.activity(i, &state, &x);
         }
@@ -270,7 +271,17 @@ fn follow(free: &Problem<'_>, start: &[f64], lacking: &[f64], mut held: Vec<usiz
         let amounts = problem.solids(&state, &totals);
         let change = change(free, &problem, (&x, &state), (&amounts, lacking));
         match change {
-            None => return finish(&problem, x, (state, totals), (&amounts, lacking)),
+            None => {
+                let dissolved = free.scarcest_dissolved(&held, &state.amounts);
+                let found = finish(&problem, x, (state, totals), (&amounts, lacking));
+                if found.is_some() || dissolved == replaced {
+                    return found;
+                }
+                // Rounding hides a little of a solid where much else is made of the same: by another of its parts it does not.
+                let (problem, totals, x, state) = seek(&dissolved, &known, &others)?;
+                let amounts = problem.solids(&state, &totals);
+                return finish(&problem, x, (state, totals), (&amounts, lacking));
+            }
             Some(Change::Leaves(k)) => _ = held.remove(k),
             Some(Change::Comes(solid)) => {
                 if let Some(shares) = Some(&held).filter(|h| !h.is_empty()).and_then(|h| free.made_of(solid, h)) {
@@ -347,11 +358,8 @@ fn reach_down(problem: &Problem<'_>, solution: &mut Solution, point: &Point, lac
     }
     let step = point.factors(problem)?.solve(right);
     let free = &problem.system.basis;
-    let is_none = |c: &usize| {
-        let total: f64 = (0..free.of.len()).map(|i| free.of[i][*c] * problem.given(i)).sum();
-        lacking[free.masters[*c]] != 0.0 && total == 0.0
-    };
-    let none: Vec<usize> = (0..free.masters.len()).filter(is_none).collect();
+    let by_all = Problem { basis: free.clone(), ..problem.clone() };
+    let none: Vec<usize> = by_all.missing(lacking).collect();
     for (i, amount) in solution.amounts.iter_mut().enumerate() {
         let is_absent = none.iter().any(|c| free.of[i][*c] != 0.0);
         *amount = if is_absent { 0.0 } else { *amount + problem.growth(&step, &point.state, i) };
