@@ -37,7 +37,8 @@ impl Slopes {
         let budget = Budget::of(0);
         let problem = Problem::new(system, args, basis.clone(), &budget);
         let Some(point) = &solution.point else { return as_given(&problem, part, arg) };
-        if matches!(part, Part::Amount(i) if solution.amounts[i as usize] == 0.0 && stays_away(system, args, i as usize, arg)) {
+        if matches!(part, Part::Amount(i) if solution.amounts[i as usize] == 0.0 && stays_away(system, args, i as usize, arg))
+        {
             return 0.0;
         }
         if self.known.len() != args.len() {

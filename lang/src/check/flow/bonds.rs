@@ -97,6 +97,21 @@ impl Bonds {
         self.states.keys().all(|state| self.holds(*state, facts))
     }
 
+    /// The states of which what is said no longer holds.
+    pub fn loose(&self, facts: &AbstractState) -> impl Iterator<Item = u32> {
+        self.states.keys().copied().filter(|state| !self.holds(*state, facts))
+    }
+
+    /// What is said here of the states that are not among others, and there of these.
+    pub fn but_for(mut self, others: &Bonds, is_other: impl Fn(u32) -> bool) -> Bonds {
+        let is_theirs = |e: &Extent| e.direction.iter().any(|(state, _)| is_other(*state));
+        self.states.retain(|state, _| !is_other(*state));
+        self.extents.retain(|e| !is_theirs(e));
+        self.states.extend(others.states.iter().filter(|(s, _)| is_other(**s)).map(|(s, bond)| (*s, bond.clone())));
+        self.extents.extend(others.extents.iter().filter(|e| is_theirs(e)).cloned());
+        self
+    }
+
     /// Forgets what something else has changed.
     pub fn settle(&mut self, facts: &AbstractState) {
         let gone: Vec<u32> = self.states.keys().copied().filter(|s| !self.holds(*s, facts)).collect();

@@ -15,6 +15,7 @@ use super::bonds::Bonds;
 use super::bracket::last_outwards;
 use super::course::Course;
 use super::fluxes::Row;
+use super::groups::Ties;
 use super::polytope::scaled;
 use super::state::AbstractState;
 use super::value::{AbstractValue, Imprecision};
@@ -70,9 +71,13 @@ const ROUNDS: usize = 8;
 #[derive(Debug, Default)]
 pub struct InvariantBox {
     /// By state.
-    states: BTreeMap<u32, (f64, f64)>,
+    pub(super) states: BTreeMap<u32, (f64, f64)>,
     /// How far what goes on can go, and what states that it changes are without it.
     bonds: Option<Rc<Bonds>>,
+    /// What each derivative that moves has to do with others.
+    pub(super) ties: BTreeMap<u32, Rc<Ties>>,
+    /// By derivative, its bounds within the box; those of amounts follow from how far what goes on can go.
+    rates: BTreeMap<u32, (f64, f64)>,
     /// States of which nothing counted as known, for concurrent steps may set them.
     pub(super) veiled: Vec<u32>,
 }
@@ -296,17 +301,13 @@ impl Interpreter<'_, '_> {
         if self.pass_unheeded(facts) {
             return Vec::new();
         }
-        if !facts.unsettled.is_empty() || facts.bonds.as_ref().is_some_and(|bonds| !bonds.all_hold(facts)) {
-            facts.barrier = None;
-        }
-        let barrier = match facts.barrier.clone() {
-            Some(barrier) if barrier.veiled == self.veiled => barrier,
-            _ => {
-                let barrier = Rc::new(self.barrier(facts));
-                facts.barrier = Some(barrier.clone());
-                barrier
-            }
+        let has_changed =
+            !facts.unsettled.is_empty() || facts.bonds.as_ref().is_some_and(|bonds| !bonds.all_hold(facts));
+        let barrier = match facts.barrier.take().filter(|barrier| barrier.veiled == self.veiled) {
+            Some(barrier) if !has_changed => barrier,
+            known => Rc::new(self.barrier(known.as_deref(), facts)),
         };
+        facts.barrier = Some(barrier.clone());
         facts.unsettled.clear();
         if barrier.states.is_empty() {
             return Vec::new();
@@ -317,13 +318,14 @@ impl Interpreter<'_, '_> {
         }
         within.bonds.clone_from(&barrier.bonds);
         let (bonds, amounts) = self.go_on(longest, &barrier, &within, facts);
-        let mut moved = self.moved(longest, &barrier, &within, facts, (&bonds, &amounts));
+        let known = Some(&barrier.rates);
+        let mut moved = self.moved(longest, (&barrier, known), &within, facts, (&bonds, &amounts));
         for _ in 0..self.refinements {
             // Until then nothing leaves these bounds, so rates within them bound it further.
             for (state, now) in &moved {
                 within.states[*state as usize] = now.clone();
             }
-            moved = self.moved(longest, &barrier, &within, facts, (&bonds, &amounts));
+            moved = self.moved(longest, (&barrier, None), &within, facts, (&bonds, &amounts));
         }
         let states = moved.iter().map(|(s, _)| *s).collect();
         for (state, now) in moved {
@@ -336,11 +338,12 @@ impl Interpreter<'_, '_> {
         states
     }
 
-    /// The states that change within `longest` s, each with its bounds, by the rates that states `within` bounds give.
+    /// The states that change within `longest` s, each with its bounds, by the rates that states `within` bounds give, as far as they are not
+    /// known.
     fn moved(
         &mut self,
         longest: f64,
-        barrier: &InvariantBox,
+        (barrier, known): (&InvariantBox, Option<&BTreeMap<u32, (f64, f64)>>),
         within: &AbstractState,
         facts: &AbstractState,
         (bonds, amounts): (&Option<Bonds>, &BTreeMap<u32, (f64, f64)>),
@@ -353,7 +356,8 @@ impl Interpreter<'_, '_> {
             let (low, high) = match amounts.get(&state) {
                 Some(bounds) => *bounds,
                 None => {
-                    let (slowest, fastest) = self.eval(derivative.rate, within).bounds();
+                    let known = known.and_then(|known| known.get(&i).copied());
+                    let (slowest, fastest) = known.unwrap_or_else(|| self.eval(derivative.rate, within).bounds());
                     let (from, to) = facts.states[state as usize].bounds();
                     let low = low.max(from + (slowest * longest).min(0.0)).min(from);
                     let high = high.min(to + (fastest * longest).max(0.0)).max(to);
@@ -445,10 +449,50 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Bounds that what moves never leaves.
-    fn barrier(&mut self, facts: &mut AbstractState) -> InvariantBox {
+    /// Bounds that what moves never leaves: those that are known, of what has nothing to do with anything that has changed since.
+    fn barrier(&mut self, known: Option<&InvariantBox>, facts: &mut AbstractState) -> InvariantBox {
+        let kept = known.map(|known| self.unaffected(known, facts)).unwrap_or_default();
+        if let Some(known) = known.filter(|_| !kept.is_empty()) {
+            let ties =
+                known.ties.iter().filter(|(i, _)| kept.contains(i)).map(|(i, ties)| (*i, ties.clone())).collect();
+            let before = facts.clone();
+            let found = self.enclosed(&kept, facts);
+            // What began to move meanwhile may have to do with what was kept.
+            if !self.are_tied(&facts.moving.clone(), &ties, facts) {
+                return self.with_kept(found, known, (kept, ties), facts);
+            }
+            *facts = before;
+        }
+        self.enclosed(&BTreeSet::new(), facts)
+    }
+
+    /// The bounds that were found together with those that are kept.
+    fn with_kept(
+        &self,
+        mut found: InvariantBox,
+        known: &InvariantBox,
+        (kept, ties): (BTreeSet<u32>, BTreeMap<u32, Rc<Ties>>),
+        facts: &mut AbstractState,
+    ) -> InvariantBox {
+        let is_kept = |state: u32| self.derivative_of(state).is_some_and(|i| kept.contains(&i));
+        found.states.extend(known.states.iter().filter(|(s, _)| is_kept(**s)).map(|(s, faces)| (*s, *faces)));
+        found.rates.extend(known.rates.iter().filter(|(i, _)| kept.contains(i)).map(|(i, rate)| (*i, *rate)));
+        found.ties.extend(ties);
+        let nothing = Bonds::default();
+        let (here, there) = (found.bonds.as_deref().cloned(), known.bonds.as_deref());
+        found.bonds = match (here, there) {
+            (None, None) => None,
+            (here, there) => Some(Rc::new(here.unwrap_or_default().but_for(there.unwrap_or(&nothing), is_kept))),
+        };
+        facts.moving.extend(kept);
+        found
+    }
+
+    /// Bounds of all that moves but for what is kept.
+    fn enclosed(&mut self, kept: &BTreeSet<u32>, facts: &mut AbstractState) -> InvariantBox {
         let mut due: BTreeSet<u32> = std::mem::take(&mut facts.unsettled);
         due.extend(&facts.moving);
+        due.retain(|i| !kept.contains(i));
         facts.rebind(Bonds::settle);
         let mut box_ = Making {
             within: facts.clone(),
@@ -474,6 +518,7 @@ impl Interpreter<'_, '_> {
             if !due.is_empty() && round % EACH == 0 && round < SWEEPS {
                 self.settle_together(facts, &mut box_, &mut due);
             }
+            due.retain(|i| !kept.contains(i));
         }
         self.narrow_together(facts, &mut box_);
         if self.is_too_much(&box_) {
@@ -481,13 +526,17 @@ impl Interpreter<'_, '_> {
         } else {
             self.narrow(facts, &mut box_);
         }
+        let (mut states, mut ties, mut rates) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        for i in &box_.moving {
+            let derivative = &self.derivatives[*i as usize];
+            states.insert(derivative.state, box_.within.states[derivative.state as usize].bounds());
+            ties.insert(*i, Rc::new(self.ties(*i, facts)));
+            if !self.is_amount(derivative.state) {
+                rates.insert(*i, self.eval(derivative.rate, &box_.within).bounds());
+            }
+        }
         facts.moving = box_.moving;
-        let bounds = |i: &u32| {
-            let state = self.derivatives[*i as usize].state;
-            (state, box_.within.states[state as usize].bounds())
-        };
-        let states = facts.moving.iter().map(bounds).collect();
-        InvariantBox { states, bonds: box_.within.bonds, veiled: self.veiled.clone() }
+        InvariantBox { states, bonds: box_.within.bonds, ties, rates, veiled: self.veiled.clone() }
     }
 
     /// Whether so many states move that bounding them takes more than a plan may ask for.

@@ -31,6 +31,7 @@ mod even;
 mod evolve;
 mod failing;
 mod fluxes;
+mod groups;
 mod handled;
 mod held;
 mod held_back;
@@ -121,6 +122,8 @@ struct Interpreter<'l, 'a> {
     sums: FxHashMap<NodeId, Option<Rc<bonds::Bonds>>>,
     /// Derivatives that depend on a state.
     rates_of: BTreeMap<u32, Vec<u32>>,
+    /// The derivative of each state that a law moves.
+    led: FxHashMap<u32, u32>,
     /// Events that depend on a state.
     events_of: BTreeMap<u32, Vec<u32>>,
     /// By state, those by which laws and events change it; made when it is first asked for.
@@ -338,6 +341,7 @@ impl<'l, 'a> Interpreter<'l, 'a> {
             values: eval::Values::new(lab.graph.ops().len()),
             sums: FxHashMap::default(),
             rates_of: BTreeMap::new(),
+            led: derivatives.iter().zip(0..).map(|(d, i)| (d.state, i)).collect(),
             events_of: BTreeMap::new(),
             led_by: OnceCell::new(),
             by_plan: OnceCell::new(),

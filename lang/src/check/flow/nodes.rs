@@ -18,6 +18,8 @@ pub(super) struct Nodes {
     pub orders: Vec<Option<Rc<[NodeId]>>>,
     /// What nodes are made of.
     pub formulas: Formulas,
+    /// By node, whether time or a law may move it; empty until it is asked for.
+    pub moving: Vec<bool>,
     /// What goes on by the laws.
     pub stoichiometry: Option<Rc<fluxes::Stoichiometry>>,
     /// What may move evenly.
