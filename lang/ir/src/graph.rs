@@ -238,6 +238,9 @@ pub struct Graph {
     leaves: Vec<Leaves>,
     #[serde(skip)]
     seen: HashMap<Key, NodeId, BuildHasherDefault<Mixer>>,
+    /// The calls by what lists their arguments, and the part they ask for.
+    #[serde(skip)]
+    asked: HashMap<(NodeId, Part), Vec<u32>>,
 }
 
 /// A graph as it is written.
@@ -423,16 +426,29 @@ impl Graph {
         for arg in args.iter() {
             list = self.add(Op::List(list, *arg));
         }
-        let is_same = |call: &Call| {
-            let alike = Arc::ptr_eq(&call.system, system) || call.system == *system;
-            call.part == part && call.args == *args && alike
+        self.solved_of(list, system, part, || args.clone())
+    }
+
+    /// The same of arguments that are listed already.
+    fn solved_of(
+        &mut self,
+        list: NodeId,
+        system: &Arc<System>,
+        part: Part,
+        args: impl FnOnce() -> Arc<[NodeId]>,
+    ) -> NodeId {
+        let asked = self.asked.entry((list, part)).or_default();
+        let is_same = |call: &u32| {
+            let known = &self.calls[*call as usize].system;
+            Arc::ptr_eq(known, system) || known == system
         };
-        let known = self.calls.iter().position(is_same);
-        let call = known.unwrap_or_else(|| {
-            self.calls.push(Call { system: system.clone(), part, args: args.clone() });
-            self.calls.len() - 1
+        let call = asked.iter().copied().find(is_same).unwrap_or_else(|| {
+            let call = self.calls.len() as u32;
+            asked.push(call);
+            self.calls.push(Call { system: system.clone(), part, args: args() });
+            call
         });
-        self.add(Op::Solved(call as u32, list))
+        self.add(Op::Solved(call, list))
     }
 
     /// What [`Op::Solved`] asks for.
@@ -518,10 +534,9 @@ impl Graph {
                 Op::Binary(op, a, b) => self.binary(op, at(a), at(b)),
                 Op::Select(c, a, b) => self.select(at(c), at(a), at(b)),
                 Op::List(a, b) => self.add(Op::List(at(a), at(b))),
-                Op::Solved(call, _) => {
+                Op::Solved(call, list) => {
                     let Call { system, part, args } = self.call(call).clone();
-                    let args = args.iter().map(|arg| at(*arg)).collect();
-                    self.solved(&system, part, &args)
+                    self.solved_of(at(list), &system, part, || args.iter().map(|arg| at(*arg)).collect())
                 }
                 Op::Const(_) | Op::Time | Op::Param(_) | Op::Local(_) | Op::Reading(_) => n,
             };
