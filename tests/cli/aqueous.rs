@@ -285,6 +285,123 @@ workflow go in bench {
 }
 
 #[test]
+fn a_little_hydroxide_comes_out_of_much_metal() {
+    let dir = folder("blue_vitriol");
+    let amounts = [82, 86, 90, 98, 99, 100, 101, 108, 110, 115, 120, 130, 140];
+    let cup = |n: &i32| {
+        format!(
+            "    c{n} = Beaker250mL at ({n}, 0, 0) m holding 200 g of water + {n} mmol of copper_sulfate_pentahydrate\n"
+        )
+    };
+    let note = |n: &i32| format!("    expect c{n}.contents.ph in 4.5 .. 5.5\n");
+    let (cups, notes): (String, String) = (amounts.iter().map(cup).collect(), amounts.iter().map(note).collect());
+    let text = format!(
+        "mtx 1
+use std::equilibria
+use std::salts
+use std::complexes
+use std::glassware::Beaker250mL
+lab bench {{
+    ambient: 25 degC
+{cups}}}
+workflow go in bench {{
+    wait 1 s
+{notes}}}
+"
+    );
+    write(&dir, "cup.mtx", text);
+    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
+    assert!(out.contains("go in bench: passed"), "{out}");
+}
+
+#[test]
+fn cyanide_keeps_metals_in_solution_and_struvite_comes_out() {
+    let dir = folder("cyanides");
+    let text = "mtx 1
+use std::equilibria
+use std::metals
+use std::complexes
+use std::solids
+use std::glassware::Beaker1000mL
+lab bench {
+    ambient: 25 degC
+    zinc = Beaker1000mL at (0, 0, 0) m holding 1 kg of water + 10 mmol of Zn2+ + 20 mmol of Cl- + 40 mmol of CN- + 40 mmol of Na+
+    nickel = Beaker1000mL at (1, 0, 0) m holding 1 kg of water + 10 mmol of Ni2+ + 20 mmol of Cl- + 40 mmol of CN- + 40 mmol of Na+
+    struvite = Beaker1000mL at (2, 0, 0) m
+        holding 1 kg of water + 10 mmol of Mg2+ + 20 mmol of Cl- + 10 mmol of NH4+ + 10 mmol of H2PO4- + 15 mmol of NaOH
+}
+workflow go in bench {
+    wait 1 s
+    // More than 99 % of it, with little hydrogen cyanide.
+    expect nickel.contents.amount[Ni_CN_4^2-] > 9.9 mmol and nickel.contents.amount[HCN] < 0.1 mmol
+    expect zinc.contents.amount[Zn_CN_4^2-] + zinc.contents.amount[Zn_CN_3-] > 9.5 mmol
+    expect struvite.contents.amount[struvite] in 5 mmol .. 7 mmol
+}
+";
+    write(&dir, "cup.mtx", text);
+    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
+    assert!(out.contains("go in bench: passed"), "{out}");
+    assert!(!out.contains("zinc_hydroxide") && !out.contains("fatal"), "{out}");
+}
+
+#[test]
+fn dissolved_solids_take_the_volume_that_they_have_in_water() {
+    let dir = folder("densities");
+    // Densities at 20 to 25 degC: glycine 20 %, 1.082; tartaric acid 10 %, 1.0455 (CRC Handbook); proline 40 %, 1.12.
+    let text = "mtx 1
+use std::equilibria
+use std::acids
+use std::glassware::Beaker250mL
+lab bench {
+    ambient: 25 degC
+    glycine = Beaker250mL at (0, 0, 0) m holding 80 g of water + 20 g of glycine
+    tartaric = Beaker250mL at (1, 0, 0) m holding 90 g of water + 10 g of tartaric_acid
+    proline = Beaker250mL at (2, 0, 0) m holding 60 g of water + 40 g of proline
+}
+workflow go in bench {
+    wait 1 s
+    expect glycine.contents.mass / glycine.contents.volume in 1.071 g/mL .. 1.093 g/mL
+    expect tartaric.contents.mass / tartaric.contents.volume in 1.035 g/mL .. 1.056 g/mL
+    expect proline.contents.mass / proline.contents.volume in 1.109 g/mL .. 1.131 g/mL
+}
+";
+    write(&dir, "cup.mtx", text);
+    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
+    assert!(out.contains("go in bench: passed"), "{out}");
+}
+
+#[test]
+fn other_ions_raise_what_dissolves_of_a_salt() {
+    let sea = "100 g of water + 1.07 mmol of Ca2+ + 48.5 mmol of Na+ + 54.8 mmol of Cl- + 5.5 mmol of Mg2+ + 2.92 mmol of SO4^2- + 1.01 mmol of K+ + 0.79 mmol of Cl-";
+    let out = poured("sea_water", "", sea, "50 g of water", "    expect cup.contents.mass > 70 g");
+    assert!(!out.contains("holds more CaSO4"), "{out}");
+    let plaster = "100 g of water + 5 mmol of Ca2+ + 5 mmol of SO4^2-";
+    let out = poured("plaster", "", plaster, "50 g of water", "    expect cup.contents.mass > 70 g");
+    assert!(out.contains("holds more CaSO4"), "{out}");
+}
+
+#[test]
+fn pairs_that_are_counted_twice_are_named() {
+    let uses = "use std::equilibria\nuse std::salts\nuse std::complexes\n";
+    let warm = "    expect cup.contents.temperature in 0 degC .. 60 degC";
+    let cold = |name: &str, uses: &str, amount: &str| {
+        poured(
+            name,
+            uses,
+            "50 g of water",
+            &format!("50 g of water + {amount} of magnesium_sulfate_heptahydrate"),
+            warm,
+        )
+    };
+    let strong = cold("epsom", uses, "50 mmol");
+    assert!(strong.contains("their heat and volume are counted twice"), "{strong}");
+    let dilute = cold("dilute_epsom", uses, "5 mmol");
+    assert!(!dilute.contains("counted twice"), "{dilute}");
+    let plain = cold("plain_epsom", "use std::equilibria\nuse std::salts\n", "50 mmol");
+    assert!(!plain.contains("counted twice"), "{plain}");
+}
+
+#[test]
 fn a_constant_with_a_wrong_digit_is_refused() {
     let dir = folder("wrong_digit");
     let checked = |constant: &str| {

@@ -270,6 +270,7 @@ impl<'a> Elaborator<'a> {
         let Declared { params, module, name, when, .. } = declared;
         let sets = self.sets(params, module);
         for (a, b) in self.moves.clone() {
+            let before = self.steps_taken();
             // The ends are known, and which is which as well.
             let narrowed = params.iter().zip(&sets).map(|(p, set)| {
                 let end = [(from, a), (to, b)].into_iter().find(|(name, _)| *name == p.name.text);
@@ -293,6 +294,7 @@ impl<'a> Elaborator<'a> {
                 };
                 out.push(Hazard { watched: Watched::Transfer(a, b, then), about: Some(a), ..hazard });
             }
+            self.count_transfer(before);
         }
     }
 

@@ -101,6 +101,17 @@ pub(super) fn solve_within(system: &System, args: &[f64], budget: &Budget) -> Op
     [false, true].into_iter().find_map(|as_numbered| solve_in_order(system, args, as_numbered, budget))
 }
 
+/// The same, sought first near a solution for arguments that are nearly these.
+pub(super) fn solve_near(system: &System, args: &[f64], budget: &Budget, near: Option<&Solution>) -> Option<Solution> {
+    let free = Problem::new(system, args, system.basis.clone(), budget);
+    let warm = near.and_then(|near| {
+        let point = near.point.as_ref()?;
+        let start = point.unknowns(system.basis.masters.iter().map(|i| near.activities[*i]));
+        follow(&free, &start, &free.lacking(), point.basis.held.clone())
+    });
+    warm.or_else(|| solve_within(system, args, budget))
+}
+
 fn solve_in_order(system: &System, args: &[f64], as_numbered: bool, budget: &Budget) -> Option<Solution> {
     if args.len() != system.layout().count() || args.iter().any(|v| v.is_nan()) {
         return None;

@@ -26,6 +26,10 @@ const DEEPEST: u32 = 1_000;
 /// Steps that an element of a list counts as: it takes some hundred bytes.
 const ELEMENT: u64 = 10;
 
+/// Of this many steps for a caution on one transfer of a plan one is counted: what those of the library ask of each has bounds of its own,
+/// and a plan may have thousands of transfers.
+const TRANSFER_STEPS: u64 = 8;
+
 /// How many steps are made between two looks at whether the check was stopped.
 const LOOK: u64 = 1 << 12;
 
@@ -69,6 +73,17 @@ impl Elaborator<'_> {
             self.take_stock();
         }
         !self.budget.over
+    }
+
+    /// The steps that were taken so far.
+    pub fn steps_taken(&self) -> u64 {
+        self.budget.steps
+    }
+
+    /// Counts only a share of the steps that were taken for a transfer since there were so many.
+    pub fn count_transfer(&mut self, since: u64) {
+        self.budget.steps = since + (self.budget.steps - since).div_ceil(TRANSFER_STEPS);
+        self.take_stock();
     }
 
     /// Ends what was begun last.

@@ -389,6 +389,45 @@ fn what_is_absent_or_dry_is_no_trouble() {
 }
 
 #[test]
+fn what_is_absent_stays_away_whatever_moves() {
+    let made = Sketch::new().equation("-1 HF 1 H+ 1 F-", -3.18, -13.3).equation("-1 water 1 H+ 1 OH-", -13.995, 55.8);
+    let mixture = made.build().real().with(&[("water", WATER), ("OH-", 1e-3)]);
+    let (system, layout) = (mixture.system.clone(), mixture.system.layout());
+    let place = |name: &str| mixture.find(name) as usize;
+    let part = Part::Amount(place("HF") as u32);
+    let mut within: Vec<(f64, f64)> = mixture.args.iter().map(|a| (*a, *a)).collect();
+    within[layout.capacity()] = (f64::INFINITY, f64::INFINITY);
+    within[layout.heat()] = (0.0, 0.0);
+    within[layout.reference()] = (298.0, 298.5);
+    // Comparisons with it are decided at once: its trace does not show.
+    assert_eq!(system.bounds_nearby(part, &within), (0.0, 0.0));
+    assert_eq!(system.bounds(part, &within), (0.0, 0.0));
+    // What brings some of it is followed all the same.
+    let mut slopes = Vec::new();
+    let args: Vec<f64> = within.iter().map(|a| a.0).collect();
+    system.slopes(part, &args, &[layout.amount(place("F-")), layout.amount(place("H+"))], &mut slopes);
+    assert!(slopes[0] > 0.0 && slopes[1] == 0.0, "{slopes:?}");
+}
+
+#[test]
+fn little_of_a_solid_is_found_beside_much_of_its_parts() {
+    // A hydroxide comes out of a strong solution of its salt, less and less of it: the acid that it sets free says how much.
+    let made = Sketch::new()
+        .equation("-1 water 1 H+ 1 OH-", -13.995, 55.8)
+        .equation("-1 Me(OH)2(s) 1 Me++ 2 OH-", -19.36, 0.0)
+        .equation("-1 H+ -1 SO4-- 1 HSO4-", 1.99, 0.0);
+    let made = made.build();
+    for n in 0..60 {
+        let salt = 0.02 * 1.12f64.powi(n);
+        let mixture = Mixture { system: made.system.clone(), args: made.args.clone() };
+        let mixture = mixture.with(&[("water", WATER), ("Me++", salt), ("SO4--", salt)]);
+        let solid = mixture.amount("Me(OH)2(s)");
+        let acid = mixture.amount("H+") - mixture.amount("OH-") + mixture.amount("HSO4-");
+        assert!((acid - 2.0 * solid).abs() <= 1e-9 * acid.abs(), "{salt}: {acid} {solid}");
+    }
+}
+
+#[test]
 fn a_total_that_rounding_leaves_below_nothing_is_followed() {
     let iodine =
         Sketch::new().equation("-1 water 1 H+ 1 OH-", -13.995, 55.8).equation("-1 I2 -1 I- 1 I3-", 2.86, 0.0).build();
