@@ -67,6 +67,9 @@ const MOST_RATES: usize = 2_000_000;
 /// Rounds of events and laws that change each other, before what they change counts as unknown.
 const ROUNDS: usize = 8;
 
+/// Bounds of derivatives, by their index.
+type Rates = BTreeMap<u32, (f64, f64)>;
+
 /// Bounds that hold for all time to come, while nothing else changes.
 #[derive(Debug, Default)]
 pub struct InvariantBox {
@@ -77,7 +80,7 @@ pub struct InvariantBox {
     /// What each derivative that moves has to do with others.
     pub(super) ties: BTreeMap<u32, Rc<Ties>>,
     /// By derivative, its bounds within the box; those of amounts follow from how far what goes on can go.
-    rates: BTreeMap<u32, (f64, f64)>,
+    rates: Rates,
     /// States of which nothing counted as known, for concurrent steps may set them.
     pub(super) veiled: Vec<u32>,
 }
@@ -343,7 +346,7 @@ impl Interpreter<'_, '_> {
     fn moved(
         &mut self,
         longest: f64,
-        (barrier, known): (&InvariantBox, Option<&BTreeMap<u32, (f64, f64)>>),
+        (barrier, known): (&InvariantBox, Option<&Rates>),
         within: &AbstractState,
         facts: &AbstractState,
         (bonds, amounts): (&Option<Bonds>, &BTreeMap<u32, (f64, f64)>),
