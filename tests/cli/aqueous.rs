@@ -34,6 +34,15 @@ fn checked(dir: &Path, text: impl AsRef<[u8]>) -> String {
     flat(&matterixc_in(dir, &["check", "cup.mtx", "--no-cache"]).out)
 }
 
+/// What `run` says of a text whose workflow `go` passes.
+fn passed(name: &str, text: impl AsRef<[u8]>) -> String {
+    let dir = folder(name);
+    write(&dir, "cup.mtx", text);
+    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
+    assert!(out.contains("go in bench: passed"), "{out}");
+    out
+}
+
 const EQUILIBRIA: &str = "use std::equilibria\n";
 
 #[test]
@@ -262,7 +271,6 @@ equilibrium extraction: I2 <-> I2_out {{ partition: 20, enthalpy: 0 kJ/mol }}"
 /// Thirteen ions of aluminium at once take up most of what half-neutralised aluminium chloride holds.
 #[test]
 fn large_clusters_are_found() {
-    let dir = folder("cluster");
     let text = "mtx 1
 use std::equilibria
 use std::metals
@@ -279,14 +287,11 @@ workflow go in bench {
     expect cup.contents.amount[Al13^7+] in 0.061 mmol .. 0.063 mmol
 }
 ";
-    write(&dir, "cup.mtx", text);
-    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
-    assert!(out.contains("go in bench: passed"), "{out}");
+    passed("cluster", text);
 }
 
 #[test]
 fn a_little_hydroxide_comes_out_of_much_metal() {
-    let dir = folder("blue_vitriol");
     let amounts = [82, 86, 90, 98, 99, 100, 101, 108, 110, 115, 120, 130, 140];
     let cup = |n: &i32| {
         format!(
@@ -309,14 +314,11 @@ workflow go in bench {{
 {notes}}}
 "
     );
-    write(&dir, "cup.mtx", text);
-    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
-    assert!(out.contains("go in bench: passed"), "{out}");
+    passed("blue_vitriol", text);
 }
 
 #[test]
 fn cyanide_keeps_metals_in_solution_and_struvite_comes_out() {
-    let dir = folder("cyanides");
     let text = "mtx 1
 use std::equilibria
 use std::metals
@@ -338,15 +340,12 @@ workflow go in bench {
     expect struvite.contents.amount[struvite] in 5 mmol .. 7 mmol
 }
 ";
-    write(&dir, "cup.mtx", text);
-    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
-    assert!(out.contains("go in bench: passed"), "{out}");
+    let out = passed("cyanides", text);
     assert!(!out.contains("zinc_hydroxide") && !out.contains("fatal"), "{out}");
 }
 
 #[test]
 fn dissolved_solids_take_the_volume_that_they_have_in_water() {
-    let dir = folder("densities");
     // Densities at 20 to 25 degC: glycine 20 %, 1.082; tartaric acid 10 %, 1.0455 (CRC Handbook); proline 40 %, 1.12.
     let text = "mtx 1
 use std::equilibria
@@ -365,9 +364,7 @@ workflow go in bench {
     expect proline.contents.mass / proline.contents.volume in 1.109 g/mL .. 1.131 g/mL
 }
 ";
-    write(&dir, "cup.mtx", text);
-    let out = matterixc_in(&dir, &["run", "cup.mtx"]).out;
-    assert!(out.contains("go in bench: passed"), "{out}");
+    passed("densities", text);
 }
 
 #[test]

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::problem::Problem;
-use super::solve::{Solution, solve_near, solve_within};
+use super::solve::{Solution, solve_within};
 use super::{Layout, Phase, System, Written};
 
 /// Between which logarithms of an activity a solution is sought, and how often that is halved before Newton's method goes on,
@@ -18,9 +18,6 @@ pub(super) const HALVINGS: [usize; 2] = [10, 18];
 
 /// Logarithms of activities one of which is taken where nothing binds the formal member, the ends first.
 const OPEN: [f64; 5] = [ACTIVITIES.0, ACTIVITIES.1, 0.0, -50.0, 50.0];
-
-/// A solution is sought near the last one where the logarithms of their activities are no further apart.
-const NEAR: f64 = 10.0;
 
 /// A share of what is bound that is rounding.
 const ROUNDED: f64 = 1e-13;
@@ -128,8 +125,7 @@ fn starts(free: &Problem<'_>, halvings: usize) -> Option<Vec<Begin>> {
     let mut last: Option<(f64, Solution)> = None;
     for _ in 0..halvings {
         let middle = 0.5 * (low + high);
-        let near = last.as_ref().filter(|(activity, _)| (activity - middle).abs() < NEAR).map(|(_, solution)| solution);
-        let solution = solve_near(&rest.system, &rest.args(free, middle), free.budget, near)?;
+        let solution = solve_within(&rest.system, &rest.args(free, middle), free.budget)?;
         let (excess, rounded) = excess(&solution);
         if excess.abs() <= rounded {
             flat.get_or_insert((middle, solution.clone()));

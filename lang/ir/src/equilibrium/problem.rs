@@ -194,11 +194,11 @@ impl<'a> Problem<'a> {
         lacking
     }
 
-    /// The masters of which there is none at all.
-    pub(super) fn missing<'l>(&'l self, lacking: &'l [f64]) -> impl Iterator<Item = usize> + 'l {
-        let basis = &self.basis;
+    /// The masters of the system of which there is none at all.
+    pub(super) fn missing(&self, lacking: &[f64]) -> Vec<usize> {
+        let basis = &self.system.basis;
         let total = |c: usize| (0..basis.of.len()).map(|i| basis.of[i][c] * self.given(i)).sum::<f64>();
-        (0..basis.masters.len()).filter(move |c| lacking[basis.masters[*c]] != 0.0 && total(*c) == 0.0)
+        (0..basis.masters.len()).filter(|c| lacking[basis.masters[*c]] != 0.0 && total(*c) == 0.0).collect()
     }
 
     /// Whether there is enough of everything that a solid is made of.

@@ -37,8 +37,7 @@ impl Slopes {
         let budget = Budget::of(0);
         let problem = Problem::new(system, args, basis.clone(), &budget);
         let Some(point) = &solution.point else { return as_given(&problem, part, arg) };
-        if matches!(part, Part::Amount(i) if solution.amounts[i as usize] == 0.0 && stays_away(system, args, i as usize, arg))
-        {
+        if matches!(part, Part::Amount(i) if stays_away(&problem, point, i as usize, arg)) {
             return 0.0;
         }
         if self.known.len() != args.len() {
@@ -52,12 +51,10 @@ impl Slopes {
 
 /// Whether nothing that a member is made of is there, and an argument brings none of it: its trace, by which the rest is solved, moves, but it
 /// is none all the same.
-fn stays_away(system: &System, args: &[f64], member: usize, arg: usize) -> bool {
-    let budget = Budget::of(0);
-    let free = Problem::new(system, args, system.basis.clone(), &budget);
-    let missing: Vec<usize> = free.missing(&free.lacking()).filter(|c| free.basis.of[member][*c] != 0.0).collect();
-    let brings = |i: usize| missing.iter().any(|c| free.basis.of[i][*c] != 0.0);
-    !missing.is_empty() && !matches!(free.layout.role(arg), Role::Amount(i) if brings(i))
+fn stays_away(problem: &Problem<'_>, point: &Point, member: usize, arg: usize) -> bool {
+    let of = &problem.system.basis.of;
+    let mut lacks = point.missing.iter().filter(|c| of[member][**c] != 0.0).peekable();
+    lacks.peek().is_some() && !matches!(problem.layout.role(arg), Role::Amount(i) if lacks.any(|c| of[i][*c] != 0.0))
 }
 
 /// Without a solvent all is as it was given.

@@ -64,6 +64,8 @@ pub(super) struct Point {
     pub(super) x: Vec<f64>,
     pub(super) totals: Totals,
     pub(super) state: State,
+    /// The masters of the system of which there is none at all.
+    pub(super) missing: Vec<usize>,
 }
 
 impl Point {
@@ -99,17 +101,6 @@ pub(super) fn solve(system: &System, args: &[f64]) -> Option<Solution> {
 /// The same by what is left of a budget.
 pub(super) fn solve_within(system: &System, args: &[f64], budget: &Budget) -> Option<Solution> {
     [false, true].into_iter().find_map(|as_numbered| solve_in_order(system, args, as_numbered, budget))
-}
-
-/// The same, sought first near a solution for arguments that are nearly these.
-pub(super) fn solve_near(system: &System, args: &[f64], budget: &Budget, near: Option<&Solution>) -> Option<Solution> {
-    let free = Problem::new(system, args, system.basis.clone(), budget);
-    let warm = near.and_then(|near| {
-        let point = near.point.as_ref()?;
-        let start = point.unknowns(system.basis.masters.iter().map(|i| near.activities[*i]));
-        follow(&free, &start, &free.lacking(), point.basis.held.clone())
-    });
-    warm.or_else(|| solve_within(system, args, budget))
 }
 
 fn solve_in_order(system: &System, args: &[f64], as_numbered: bool, budget: &Budget) -> Option<Solution> {
@@ -349,7 +340,7 @@ fn finish(
         amounts,
         point: None,
     };
-    let point = Point { basis, x, totals, state };
+    let point = Point { basis, x, totals, state, missing: problem.missing(lacking) };
     reach_down(problem, &mut solution, &point, lacking)?;
     keeps_all(problem, &solution).then_some(())?;
     solution.point = Some(point);
@@ -369,10 +360,8 @@ fn reach_down(problem: &Problem<'_>, solution: &mut Solution, point: &Point, lac
     }
     let step = point.factors(problem)?.solve(right);
     let free = &problem.system.basis;
-    let by_all = Problem { basis: free.clone(), ..problem.clone() };
-    let none: Vec<usize> = by_all.missing(lacking).collect();
     for (i, amount) in solution.amounts.iter_mut().enumerate() {
-        let is_absent = none.iter().any(|c| free.of[i][*c] != 0.0);
+        let is_absent = point.missing.iter().any(|c| free.of[i][*c] != 0.0);
         *amount = if is_absent { 0.0 } else { *amount + problem.growth(&step, &point.state, i) };
     }
     Some(())

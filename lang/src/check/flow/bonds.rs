@@ -94,7 +94,7 @@ impl Bonds {
 
     /// Whether what is said of all states still holds.
     pub fn all_hold(&self, facts: &AbstractState) -> bool {
-        self.states.keys().all(|state| self.holds(*state, facts))
+        self.loose(facts).next().is_none()
     }
 
     /// The states of which what is said no longer holds.
@@ -114,7 +114,7 @@ impl Bonds {
 
     /// Forgets what something else has changed.
     pub fn settle(&mut self, facts: &AbstractState) {
-        let gone: Vec<u32> = self.states.keys().copied().filter(|s| !self.holds(*s, facts)).collect();
+        let gone: Vec<u32> = self.loose(facts).collect();
         self.release(&gone);
     }
 

@@ -15,7 +15,7 @@ use super::bonds::Bonds;
 use super::bracket::last_outwards;
 use super::course::Course;
 use super::fluxes::Row;
-use super::groups::Ties;
+use super::groups::{Ties, are_tied};
 use super::polytope::scaled;
 use super::state::AbstractState;
 use super::value::{AbstractValue, Imprecision};
@@ -461,7 +461,7 @@ impl Interpreter<'_, '_> {
             let before = facts.clone();
             let found = self.enclosed(&kept, facts);
             // What began to move meanwhile may have to do with what was kept.
-            if !self.are_tied(&facts.moving.clone(), &ties, facts) {
+            if !are_tied(&found.ties, &ties) {
                 return self.with_kept(found, known, (kept, ties), facts);
             }
             *facts = before;
@@ -616,9 +616,8 @@ impl Interpreter<'_, '_> {
         changed.extend(further.flat_map(|(extent, _)| extent.direction.iter().map(|(state, _)| *state)));
         bonds.stamp(&making.within);
         making.within.bonds = Some(shared);
-        let stoichiometry = self.stoichiometry();
         for state in changed {
-            let of = stoichiometry.of_state.get(&state).copied();
+            let of = self.derivative_of(state);
             if let Some(i) = of.filter(|_| !self.is_amount(state)) {
                 self.put(i, facts, making);
             }

@@ -39,8 +39,6 @@ pub struct Stoichiometry {
     pub directions: Vec<(Direction, f64)>,
     /// By derivative; none where no flux that changes matter stands in it.
     pub rows: Vec<Option<Rc<Row>>>,
-    /// The derivative of each state that has one.
-    pub of_state: BTreeMap<u32, u32>,
     /// Nodes that are sums of states, and stand in something that is none.
     outer: Vec<bool>,
 }
@@ -93,7 +91,6 @@ impl Interpreter<'_, '_> {
             directions: changes.into_iter().map(|c| direction(c).unwrap_or_default()).collect(),
             fluxes: fluxes.into_iter().map(|(flux, _)| flux.clone()).collect(),
             rows,
-            of_state: self.derivatives.iter().enumerate().map(|(i, d)| (d.state, i as u32)).collect(),
             outer: self.outer_sums(),
         }
     }

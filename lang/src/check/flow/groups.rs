@@ -43,20 +43,6 @@ impl Interpreter<'_, '_> {
         known.ties.keys().copied().filter(|i| facts.moving.contains(i) && !affected.contains(i)).collect()
     }
 
-    /// Whether any of some derivatives has to do with any of others.
-    pub(super) fn are_tied(
-        &mut self,
-        some: &BTreeSet<u32>,
-        others: &BTreeMap<u32, Rc<Ties>>,
-        facts: &AbstractState,
-    ) -> bool {
-        let mut ties = others.clone();
-        for i in some {
-            ties.insert(*i, Rc::new(self.ties(*i, facts)));
-        }
-        together(&ties, some).iter().any(|i| others.contains_key(i))
-    }
-
     /// What a derivative has to do with others as things are.
     pub(super) fn ties(&mut self, derivative: u32, facts: &AbstractState) -> Ties {
         let stoichiometry = self.stoichiometry();
@@ -142,6 +128,12 @@ impl Interpreter<'_, '_> {
         }
         all
     }
+}
+
+/// Whether any of some derivatives has to do with any of others.
+pub(super) fn are_tied(some: &BTreeMap<u32, Rc<Ties>>, others: &BTreeMap<u32, Rc<Ties>>) -> bool {
+    let all = others.iter().chain(some).map(|(i, ties)| (*i, ties.clone())).collect();
+    together(&all, &some.keys().copied().collect()).iter().any(|i| others.contains_key(i))
 }
 
 /// All that has to do with any of these, by what each rests on and the fluxes of matter that it shares.

@@ -219,10 +219,7 @@ impl Interpreter<'_, '_> {
         let set_by_events =
             self.events.iter().flat_map(|event| self.changed_by(&event.actions)).collect::<BTreeSet<u32>>();
         let lasts = |s: &u32| {
-            !raced.contains(s)
-                && !beside.contains(s)
-                && !set_by_events.contains(s)
-                && !self.derivatives.iter().any(|d| d.state == *s)
+            !raced.contains(s) && !beside.contains(s) && !set_by_events.contains(s) && self.derivative_of(*s).is_none()
         };
         for state in self.writes(body).into_iter().filter(lasts).collect::<Vec<u32>>() {
             let place = changed_by(&failed.history, &None, state).unwrap_or_else(|| self.site());
