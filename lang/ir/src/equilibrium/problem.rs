@@ -1,6 +1,6 @@
 //! A system with its arguments, seen by a basis: what is given, what no equation changes, and where a solution is sought from.
 
-use std::cell::Cell;
+use std::cell::{Cell, LazyCell};
 use std::sync::Arc;
 
 use super::activity::{Activities, Coefficients};
@@ -209,7 +209,7 @@ impl<'a> Problem<'a> {
     /// For each solid, one of its parts, so that there is little of all of them: its amount is known by that to the last digit. Of the
     /// ways to give each one a part of its own it is that whose largest total is least.
     pub(super) fn scarcest(&self, held: &[usize]) -> Vec<usize> {
-        let totals = self.totals(&vec![0.0; self.basis.of.len()]).of;
+        let totals = LazyCell::new(|| self.totals(&vec![0.0; self.basis.of.len()]).of);
         self.ranked(held, |c, of| if self.basis.is_matter[c] { totals[c] / of } else { f64::INFINITY })
     }
 
@@ -217,15 +217,11 @@ impl<'a> Problem<'a> {
     pub(super) fn scarcest_dissolved(&self, held: &[usize], amounts: &[f64]) -> Vec<usize> {
         let part = |i: usize, c: usize| (self.basis.of[i][c] * amounts[i]).abs();
         let of_all = |c: usize| self.basis.solutes.iter().map(|i| part(*i, c)).fold(0.0, f64::max);
-        let most: Vec<f64> = (0..self.basis.masters.len()).map(of_all).collect();
-        self.ranked(held, |c, of| most[c] / of.abs())
+        self.ranked(held, |c, of| of_all(c) / of.abs())
     }
 
     /// For each solid, one of its parts, each another one, so that the largest rank is least.
     fn ranked(&self, held: &[usize], rank: impl Fn(usize, f64) -> f64) -> Vec<usize> {
-        if held.is_empty() {
-            return Vec::new();
-        }
         let rank = |(c, of): &(usize, f64)| rank(*c, *of);
         let choices: Vec<Vec<(usize, f64)>> = held
             .iter()
