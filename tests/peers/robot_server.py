@@ -31,6 +31,7 @@ from opentrons.protocol_engine.create_protocol_engine import create_protocol_eng
 from opentrons.protocol_engine.errors import ProtocolEngineError
 from opentrons.protocol_reader import ProtocolReader
 from opentrons.protocol_runner import RunOrchestrator
+from opentrons_shared_data.labware import load_definition
 from opentrons_shared_data.labware.labware_definition import labware_definition_type_adapter
 from pydantic import TypeAdapter, ValidationError
 
@@ -99,6 +100,7 @@ class Robot:
         self.protocols = {}
         self.commands = []
         self.exchanges = []
+        self.switched_off = []
         self.spoil = None
         self.stop_at = None
 
@@ -108,8 +110,9 @@ class Robot:
         if parts[0] == "protocols":
             return self.protocol(method, parts[1:], body)
         if method == "GET" and parts == ["modules"]:
-            there = [m for run in self.runs.values() for m in run.engine.state_view.modules.get_all()]
-            return 200, {"data": [{"id": f"module-{m.serialNumber}", "serialNumber": m.serialNumber} for m in there]}
+            return 200, {"data": [m for run in self.runs.values() for m in attached(run)]}
+        if method == "POST" and parts == ["commands"]:
+            return self.stateless(body)
         if method == "POST" and parts == ["runs"]:
             run = str(uuid.uuid4())
             self.runs[run] = wait_for(begun(self.protocols.get(body["data"].get("protocolId"))))
@@ -134,6 +137,18 @@ class Robot:
                 wait_for(run.steered.stop())
                 return 201, {"data": {"id": str(uuid.uuid4()), "actionType": "stop"}}
         return 405, {"errors": [{"id": "NotAllowed", "detail": f"{method} {path}"}]}
+
+    def stateless(self, body):
+        """A command outside of runs: the engine's own model reads it, and it switches off what a run left on."""
+        try:
+            create = CREATE.validate_python(body["data"])
+        except ValidationError as e:
+            return 422, {"errors": [{"id": "InvalidRequest", "title": "Invalid Request", "detail": str(e)}]}
+        known = {m["id"] for run in self.runs.values() for m in attached(run)}
+        if create.params.moduleId not in known:
+            return 201, {"data": {"id": "0", "status": "failed", "error": {"errorType": "ModuleNotLoadedError", "detail": "?"}}}
+        self.switched_off.append((create.commandType, create.params.moduleId))
+        return 201, {"data": {"id": str(uuid.uuid4()), "status": "succeeded"}}
 
     def protocol(self, method, parts, body):
         """A protocol in a form, and its analysis."""
@@ -170,6 +185,16 @@ class Robot:
             return 409, {"errors": [{"id": "RunStopped", "title": "Run Stopped", "detail": str(e)}]}
         self.commands.append((run, command.id))
         return 201, {"data": run.command(command.id) if waits else shown(command)}
+
+
+def attached(run):
+    """The modules of a run as the robot's server shows them. Virtual modules have no temperature: they are at their set points at once."""
+    view = run.engine.state_view.modules
+    for m in view.get_all():
+        known = view._state.substate_by_module_id[m.id]
+        target = getattr(known, "plate_target_temperature", None) or getattr(known, "target_block_temperature", None)
+        data = {"currentTemperature": 22.0 if target is None else target, "lidTemperature": 105.0}
+        yield {"id": f"module-{m.serialNumber}", "serialNumber": m.serialNumber, "data": data}
 
 
 def shown(command):
@@ -289,9 +314,7 @@ def uploaded(command, folder, file):
 
 def own_labware(command, folder, file):
     """Labware that is not in Opentrons' own library is given to the robot, which then knows it."""
-    assets = pathlib.Path(__file__).parents[2] / "assets" / "labware"
-    definition = json.loads((assets / "corning_96_wellplate_360ul_flat.json").read_text())
-    definition |= {"namespace": "house", "version": 7}
+    definition = load_definition("corning_96_wellplate_360ul_flat", 2) | {"namespace": "house", "version": 7}
     definition["parameters"]["loadName"] = "flat_96"
     text = pathlib.Path(file).read_text().replace("plate = Corning96", "plate = Own")
     text = text.replace("lab deck {", 'asset Own from labware "plate.json"\n\nlab deck {')
@@ -342,6 +365,26 @@ def spoiled(command, folder, file):
     verdict("a run that was stopped at the robot", good, "run_stopped" if good else ended.stderr[-1500:])
 
 
+def left_on(command, folder, file):
+    """A run that fails while modules are on: each is switched off, by the identifier that the server gives to it."""
+    text = pathlib.Path(file).read_text()
+    robot = Robot()
+
+    def no_tip(data):
+        if data["commandType"] == "pickUpTip":
+            data["commandType"], data["params"] = "comment", {"message": "the tip is left where it is"}
+
+    for name, spoil, stop_at, failure in [("cut", no_tip, None, "no_tip"), ("halted", None, "aspirate", "run_stopped")]:
+        robot = Robot()
+        robot.spoil, robot.stop_at = spoil, stop_at
+        ended = deploy(command, folder, f"left_on_{name}", text, serve(robot))
+        off = collections.Counter(kind for kind, _ in robot.switched_off)
+        wanted = ["heaterShaker/deactivateHeater", "heaterShaker/deactivateShaker", "temperatureModule/deactivate", "magneticModule/disengage",
+                  "thermocycler/deactivateBlock", "thermocycler/deactivateLid"]
+        good = ended.returncode == 1 and failure in ended.stderr and all(off[kind] >= 1 for kind in wanted)
+        verdict(f"{failure} with modules on: all are switched off", good, f"{dict(off)}" if good else f"{dict(off)} {ended.stderr[-1500:]}")
+
+
 def main():
     arguments = sys.argv[1:]
     recording = None
@@ -355,6 +398,9 @@ def main():
         whole(command, folder, file, recording if number == 0 else None)
     uploaded(command, folder, files[0])
     own_labware(command, folder, files[0])
+    for file in files:
+        if pathlib.Path(file).stem == "modules":
+            left_on(command, folder, file)
     spoiled(command, folder, files[0])
     sys.exit(1 if BAD else 0)
 

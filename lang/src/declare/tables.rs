@@ -12,7 +12,7 @@ use super::kinds::Kinds;
 use super::properties::{self, Properties};
 use super::species::SpeciesTable;
 use super::units;
-use crate::ast::{AssetLine, Expr, ExprKind, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
+use crate::ast::{AssetLine, Expr, ExprKind, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role, Sig};
 use crate::names::{DeclId, Names, verb_text};
 use crate::stop::Stop;
 use crate::units::text::UnitError;
@@ -238,18 +238,26 @@ impl<'a> Tables<'a> {
         }
     }
 
-    /// The members that no more derived capability declares again.
+    /// The members that no more derived capability declares again: those with a name by that, commands by their words and labels.
     pub fn visible(&self, members: Vec<MemberRef<'a>>) -> Vec<MemberRef<'a>> {
         let mut alike: FxHashMap<&str, Vec<DeclId>> = FxHashMap::default();
+        let mut commands: FxHashMap<String, Vec<(&Sig, DeclId)>> = FxHashMap::default();
         for member in &members {
             if let Some(name) = member_name(member.member) {
                 alike.entry(&name.text).or_default().push(member.owner);
+            } else if let MemberKind::Command { sig, .. } = &member.member.kind {
+                commands.entry(verb_text(&sig.verb)).or_default().push((sig, member.owner));
             }
         }
-        let hidden = |m: &MemberRef<'a>| {
-            let others = member_name(m.member).and_then(|name| alike.get(name.text.as_str()));
-            let hides = |o: &DeclId| *o != m.owner && self.kinds.get(o).is_some_and(|k| k.has(m.owner));
-            others.is_some_and(|owners| owners.iter().any(hides))
+        let hides = |o: &DeclId, m: &MemberRef<'a>| *o != m.owner && self.kinds.get(o).is_some_and(|k| k.has(m.owner));
+        let hidden = |m: &MemberRef<'a>| match &m.member.kind {
+            MemberKind::Command { sig, .. } => commands
+                .get(&verb_text(&sig.verb))
+                .is_some_and(|all| all.iter().any(|(other, o)| hides(o, m) && other.has_form_of(sig))),
+            _ => {
+                let others = member_name(m.member).and_then(|name| alike.get(name.text.as_str()));
+                others.is_some_and(|owners| owners.iter().any(|o| hides(o, m)))
+            }
         };
         members.iter().filter(|m| !hidden(m)).copied().collect()
     }

@@ -373,6 +373,15 @@ impl<'a> Planner<'a, '_> {
                 }
             }
         }
+        let commands = fitting.iter().filter_map(|(verb, _)| match verb {
+            Verb::Command(_, m) => Some(*m),
+            Verb::Skill(_) => None,
+        });
+        let visible = self.lab.tables.visible(commands.collect());
+        fitting.retain(|(verb, _)| match verb {
+            Verb::Command(_, m) => visible.iter().any(|v| std::ptr::eq(v.member, m.member)),
+            Verb::Skill(_) => true,
+        });
         let best = fitting.iter().map(|f| f.1).min();
         let chosen: Vec<_> = fitting.iter().filter(|f| Some(f.1) == best).map(|f| f.0.clone()).collect();
         if let Some(one) = chosen.first() {

@@ -339,6 +339,12 @@ impl<'a> Elaborator<'a> {
         kinds.iter().any(|k| self.tables.kinds.get(k).is_some_and(|info| info.has(kind)))
     }
 
+    /// The commands with this verb that an instance has, without those that a more derived capability of it declares again.
+    pub fn commands_of(&self, id: InstanceId, verb: &str) -> Vec<MemberRef<'a>> {
+        let own = self.tables.commands(verb).iter().filter(|m| self.instance_is(id, m.owner));
+        self.tables.visible(own.copied().collect())
+    }
+
     /// The type of an instance, for messages.
     pub fn kind_names(&self, id: InstanceId) -> String {
         let kinds = &self.instances[id.0 as usize].kinds;

@@ -56,8 +56,7 @@ impl<'a> Planner<'a, '_> {
     /// What the command of a line sets: targets and values.
     fn assigned(&self, w: &'a Wire, instance: InstanceId) -> Vec<(&'a Expr, &'a Expr)> {
         let WireKind::Command { sig, .. } = &w.kind else { return Vec::new() };
-        let commands = self.lab.tables.commands(&verb_text(&sig.verb)).to_vec();
-        let own = commands.into_iter().filter(|m| self.lab.instance_is(instance, m.owner));
+        let own = self.lab.commands_of(instance, &verb_text(&sig.verb)).into_iter();
         let meant = own.filter(|m| command_sig(m).is_some_and(|of| sig.has_form_of(of)));
         let clauses = meant.flat_map(|m| match &m.member.kind {
             MemberKind::Command { clauses, .. } => clauses.as_slice(),

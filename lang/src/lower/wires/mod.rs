@@ -306,9 +306,7 @@ impl<'a> Planner<'a, '_> {
             }
             return found;
         }
-        let commands = self.lab.tables.commands(&verb).to_vec();
-        let own: Vec<MemberRef<'a>> =
-            commands.into_iter().filter(|m| self.lab.instance_is(instance, m.owner)).collect();
+        let own = self.lab.commands_of(instance, &verb);
         let found = own.iter().find(|m| command_sig(m).is_some_and(|of| sig.has_form_of(of)));
         if found.is_none() {
             let forms: Vec<String> = own.iter().filter_map(|m| command_sig(m)).map(|of| self.form(of)).collect();

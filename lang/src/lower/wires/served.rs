@@ -207,10 +207,8 @@ impl<'a> Planner<'a, '_> {
     pub(super) fn by_name(&mut self, verb: &[Name], instance: InstanceId, module: usize) -> Option<Served> {
         let text = verb_text(verb);
         let span = verb.first()?.span.to(verb.last()?.span);
-        let commands = self.lab.tables.commands(&text).to_vec();
-        let own = commands.into_iter().find(|m| {
-            self.lab.instance_is(instance, m.owner) && command_sig(m).is_some_and(|s| s.all_params().next().is_none())
-        });
+        let mut commands = self.lab.commands_of(instance, &text).into_iter();
+        let own = commands.find(|m| command_sig(m).is_some_and(|s| s.all_params().next().is_none()));
         let Some(m) = own else {
             let headline = format!("the device has no command `{text}` without arguments");
             self.lab.report(Diagnostic::error(
