@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::{Condition, Plan, Step};
+use matterix_ir::plan::{Condition, Plan, Step, StepId};
 use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, NodeId, Op, Program, Sources, Span, codes};
 
@@ -145,6 +145,19 @@ pub fn open(
                 "known only during the run",
                 "write the number of turns",
             ),
+            Step::Wait { .. } if wiring.awaited.contains_key(&StepId(index as u32)) => {
+                let never = |a: &Act| a.step.0 as usize == index && a.deed == Deed::Awaited { holds: false };
+                if let (true, Some(condition)) =
+                    (acts.iter().any(never), wiring.awaited.get(&StepId(index as u32)))
+                {
+                    say(
+                        own(condition.span),
+                        format!("{what} would go on before `{}` holds", condition.text),
+                        "the device waits for its set point, and this does not hold there",
+                        "wait for what holds at its set point",
+                    );
+                }
+            }
             Step::Wait { duration } if course.is_open(*duration) => {
                 say(at, format!("{what} needs a fixed duration"), "known only during the run", "write the duration")
             }

@@ -47,6 +47,11 @@ pub enum Deed {
     Wait(f64),
     /// A wait for a condition.
     WaitUntil,
+    /// The end of a device's own wait instead of one for a condition.
+    Awaited {
+        /// Whether the condition holds now.
+        holds: bool,
+    },
     /// A remark.
     Note(String),
     /// A question to a person.
@@ -88,9 +93,9 @@ impl<'p> Performance<'p> {
     }
 }
 
-/// The quantities, truths, words and instances of a message.
+/// The condition, quantities, truths, words and instances of a message.
 pub(crate) fn nodes_of(message: &Message) -> impl Iterator<Item = NodeId> {
-    nodes(&message.text)
+    message.condition.into_iter().chain(nodes(&message.text))
 }
 
 fn nodes(text: &Text) -> impl Iterator<Item = NodeId> {
@@ -165,7 +170,9 @@ impl Listener for Performance<'_> {
                     _ => None,
                 }));
             }
-            Step::Wait { duration } => wanted.push(*duration),
+            Step::Wait { duration } => {
+                wanted.push(self.subject.wiring.awaited.get(&step).map_or(*duration, |condition| condition.node));
+            }
             _ => {}
         }
         wanted
@@ -176,7 +183,12 @@ impl Listener for Performance<'_> {
         let mut values = values.iter().copied();
         if step == program.plan.root && self.opened.is_empty() {
             for device in &self.subject.wiring.devices {
-                self.opened.push(device.opens.iter().map(|m| fill(program, m, &mut values)).collect());
+                let said = device.opens.iter().filter_map(|m| {
+                    let holds = m.condition.is_none_or(|_| values.next().flatten().is_some_and(|v| v != 0.0));
+                    let said = fill(program, m, &mut values);
+                    holds.then_some(said)
+                });
+                self.opened.push(said.collect());
             }
         }
         let mut words = program.plan.get(step).label.clone();
@@ -188,6 +200,9 @@ impl Listener for Performance<'_> {
                     words = tell(program, call, &mut values);
                 }
                 Deed::Operation(said)
+            }
+            Step::Wait { .. } if self.subject.wiring.awaited.contains_key(&step) => {
+                Deed::Awaited { holds: values.next().flatten().is_some_and(|v| v != 0.0) }
             }
             Step::Wait { .. } => {
                 let seconds = values.next().flatten().unwrap_or(0.0);

@@ -33,6 +33,7 @@ class Reader:
         self.aimed = {}  # by mount: the area it was moved over
         self.targets = {}  # by module: what it was set to
         self.holds = {}  # by module: for how long it holds that, once it is there
+        self.lids = {}
         self.out = []
 
     def say(self, verb, *what):
@@ -167,6 +168,13 @@ class Reader:
             case "thermocycler/waitForBlockTemperature":
                 module = self.modules[params["moduleId"]]
                 self.held(module, self.holds.pop(module, 0.0))
+            case "thermocycler/openLid" | "thermocycler/closeLid":
+                # It is open at first; to open it while it is open does nothing.
+                module = self.modules[params["moduleId"]]
+                lid = kind.split("/")[1][:-3]
+                if self.lids.get(module, "open") != lid:
+                    self.say(kind, module)
+                self.lids[module] = lid
             case "thermocycler/runProfile":
                 module = self.modules[params["moduleId"]]
                 for step in params["profile"]:

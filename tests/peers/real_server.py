@@ -1,6 +1,6 @@
 """Workflows on the server of Opentrons' robot itself, from its source, with simulated hardware.
 
-usage: real_server.py MATTERIXC FOLDER SOURCE PYTHON FILE.mtx...
+usage: real_server.py MATTERIXC FOLDER SOURCE PYTHON FILE.mtx... [--play FILE.mtx...]
 
 The server is not on PyPI. SOURCE is a checkout of https://github.com/Opentrons/opentrons at the tag v8.1.0, of which `robot-server` and
 `server-utils` are used; PYTHON is a Python 3.10 with opentrons==8.1.0, fastapi==0.99.1, uvicorn==0.27.0.post1, anyio==3.7.1,
@@ -8,7 +8,8 @@ python-multipart==0.0.6, pydantic==1.10.12, python-dotenv==1.0.1, sqlalchemy==1.
 
 Each workflow is deployed on a robot with its pipettes, and the server is asked what it did: every command has succeeded, and moves
 the volumes that the emitted form says. Then emitted protocols are uploaded and played, labware of one's own and what was measured
-of a plate are given to it, a person stops a run, and another pipette hangs there.
+of a plate are given to it, a person stops a run, and another pipette hangs there. Files after `--play` are only uploaded and played, with
+waits of 1 s and without questions, which the server would put to a person.
 """
 
 import collections
@@ -26,10 +27,21 @@ import urllib.error
 import urllib.request
 
 COMMAND, FOLDER, SOURCE, PYTHON, *FILES = sys.argv[1:]
+PLAYED = FILES[FILES.index("--play") + 1 :] if "--play" in FILES else []
+FILES = FILES[: FILES.index("--play")] if "--play" in FILES else FILES
 COMMAND, SOURCE = os.path.abspath(COMMAND), os.path.abspath(SOURCE)
 SPEED = "20"
 ADDRESS = ""
 BAD = []
+
+
+#: How the simulated hardware calls modules.
+KINDS = {
+    "heaterShakerModuleV1": "heatershaker",
+    "temperatureModuleV2": "tempdeck",
+    "magneticModuleV2": "magdeck",
+    "thermocyclerModuleV2": "thermocycler",
+}
 
 
 def pipettes(text):
@@ -38,17 +50,25 @@ def pipettes(text):
     ADDRESS = "127.0.0.1:1"
     said = ran(place(f"dry{len(os.listdir(FOLDER))}", text), "deploy", "lab.mtx", "--bind", "lab.toml").stdout
     found = re.findall(r'pipetteName\\":\\"(\w+)\\",\\"mount\\":\\"(\w+)', said)
-    return {mount: {"model": name.replace("_gen2", "_v2.1"), "id": mount} for name, mount in found}
+    return {mount: {"model": versioned(name), "id": mount} for name, mount in found}
+
+
+def versioned(name):
+    """A pipette with a version, as robots have them."""
+    return name.replace("_gen2", "_v2.1") if name.endswith("_gen2") else f"{name}_v1.4"
 
 
 @contextlib.contextmanager
-def robot(attached):
-    """A robot with these pipettes and a heater-shaker."""
+def robot(attached, models=tuple(KINDS)):
+    """A robot with these pipettes and modules."""
     global ADDRESS
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    modules = {"heatershaker": [{"model": "heaterShakerModuleV1", "serial_number": "hs", "calls": []}]}
+    modules = {}
+    for model in models or ["temperatureModuleV2"]:
+        of_kind = modules.setdefault(KINDS[re.sub(r"V\d", "V2", model)] if model not in KINDS else KINDS[model], [])
+        of_kind.append({"model": model, "serial_number": f"{model}{len(of_kind)}", "calls": []})
     simulated = pathlib.Path(FOLDER) / f"{port}.json"
     simulated.write_text(json.dumps({"machine": "OT-2 Standard", "attached_instruments": attached, "attached_modules": modules}))
     environment = os.environ | {
@@ -162,9 +182,39 @@ def played(text):
         verdict(f"{target}, uploaded and played", good, status if good else ended.stderr[-1500:])
 
 
+def plays(file):
+    """A protocol that the robot runs by itself, on a robot with its pipettes: each of its commands has succeeded."""
+    source = pathlib.Path(file)
+    text = re.sub(r"\bwait [\d.]+ (s|min|h)\b", "wait 1 s", source.read_text())
+    text = re.sub(r'\bask "', 'note "', text)
+    # This version knows no lights in JSON.
+    text = re.sub(r"^ *(dim|light) .*\n", "", text, flags=re.M)
+    global ADDRESS
+    ADDRESS = "127.0.0.1:1"
+    folder = place(f"plays_{source.stem}", text)
+    for table in source.parent.glob(f"{source.stem}*.csv"):
+        (folder / table.name).write_text(table.read_text())
+    emitted = json.loads(ran(folder, "emit", "lab.mtx", "--target", "opentrons-json").stdout)["commands"]
+    loaded = {c["params"]["mount"]: c["params"]["pipetteName"] for c in emitted if c["commandType"] == "loadPipette"}
+    models = [c["params"]["model"] for c in emitted if c["commandType"] == "loadModule"]
+    with robot({mount: {"model": versioned(name), "id": mount} for mount, name in loaded.items()}, models):
+        (folder / "lab.toml").write_text(f'[ot2]\nhttp = "{ADDRESS}"\n')
+        ended = ran(folder, "emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml")
+        runs = ask("/runs")
+        if not runs:
+            verdict(f"{source.stem}, played by the robot", False, ended.stderr[-1500:])
+            return
+        run = runs[-1]
+        listed = ask(f"/runs/{run['id']}/commands?cursor=0&pageLength=10000")
+        kinds = sorted({c["commandType"].split("/")[0] for c in listed if "/" in c["commandType"]})
+        good = ended.returncode == 0 and run["status"] == "succeeded" and all(c["status"] == "succeeded" for c in listed)
+        said = f"{len(listed)} commands, {', '.join(kinds) or 'no modules'}"
+        verdict(f"{source.stem}, played by the robot", good, said if good else f"{run['status']} {ended.stderr[-1500:]}")
+
+
 def own_labware(text):
-    assets = pathlib.Path(__file__).parents[2] / "assets" / "labware"
-    definition = json.loads((assets / "corning_96_wellplate_360ul_flat.json").read_text())
+    load = "import json, opentrons_shared_data.labware as l; print(json.dumps(l.load_definition('corning_96_wellplate_360ul_flat', 2)))"
+    definition = json.loads(subprocess.run([PYTHON, "-c", load], capture_output=True, text=True, check=True).stdout)
     definition |= {"namespace": "house", "version": 7}
     definition["parameters"]["loadName"] = "flat_96"
     text = text.replace("plate = Corning96", "plate = Own")
@@ -214,17 +264,24 @@ def stopped(text):
 
 
 COOK = """mtx 1
-use std::opentrons::{Corning96, HeaterShaker, OT2, P300Single, Reservoir12, TipRack300}
+use std::opentrons::{Corning96, HeaterShaker, MagneticModule, OT2, P300Single, Reservoir12, TemperatureModule, ThermocyclerGen2, TipRack300}
 lab deck {
     ambient: 22 degC
     ot2 = OT2 { left: P300Single } at (0, 0, 0) m
-    tips = TipRack300 on ot2.slot[10]
+    tips = TipRack300 on ot2.slot[5]
     shaker = HeaterShaker on ot2.slot[1]
+    cold = TemperatureModule on ot2.slot[3]
+    magnets = MagneticModule on ot2.slot[6]
+    cycler = ThermocyclerGen2 on ot2.slot[7]
     plate = Corning96 on shaker
-    stock = Reservoir12 on ot2.slot[3] holding { A1: 10 mL of water }
+    stock = Reservoir12 on ot2.slot[9] holding { A1: 10 mL of water }
 }
 workflow cook in deck {
     close latch shaker
+    heat cold to 10 degC
+    engage magnets at 5 mm
+    heat cycler to 60 degC
+    heat lid cycler to 100 degC
     heat shaker to 60 degC
     shake shaker at 500 rpm
     wait 200 s
@@ -234,14 +291,25 @@ workflow cook in deck {
 """
 
 
-def module():
-    """What the heater-shaker does, by the server."""
-    data = ask("/modules")[0]["data"]
-    return data["temperatureStatus"], data.get("targetTemperature"), data["speedStatus"], data["currentSpeed"]
+def modules():
+    """What the modules do, by the server: is each on?"""
+    on = {}
+    for m in ask("/modules"):
+        data = m["data"]
+        match m["moduleModel"]:
+            case "heaterShakerModuleV1":
+                on |= {"heater": data["temperatureStatus"] != "idle", "shaker": data["currentSpeed"] > 0}
+            case "temperatureModuleV2":
+                on["cold"] = data["status"] != "idle"
+            case "magneticModuleV2":
+                on["magnets"] = data["engaged"]
+            case "thermocyclerModuleV2":
+                on |= {"block": data["status"] != "idle", "lid": data.get("lidTargetTemperature") is not None}
+    return on
 
 
 def hot(name, stop):
-    """A workflow that is stopped while the heater-shaker is hot and in motion; what it says, its status, and how long it took."""
+    """A workflow that is stopped while every module is on; what it says, and how long it took."""
     folder = place(name, COOK)
     process = subprocess.Popen([COMMAND, *DEPLOY[:-1], "1"], cwd=folder, stderr=subprocess.PIPE, text=True)
     journal = folder / "journal"
@@ -249,16 +317,16 @@ def hot(name, stop):
     while time.monotonic() < until and not (journal.exists() and "setAndWaitForShakeSpeed" in journal.read_text()):
         time.sleep(0.2)
     time.sleep(2)
-    before = module()
+    before = modules()
     entries = map(json.loads, journal.read_text().splitlines()[1:])
     run = next(e["text"] for e in entries if e["event"] == "kept" and e["word"] == "run")
     begun = time.monotonic()
     stop(process, run)
     said = process.communicate(timeout=120)[1]
     took = time.monotonic() - begun
-    is_on, is_off = before[1] == 60 and before[3] == 500, module()[0] == "idle" and module()[2] == "idle"
-    good = process.returncode == 1 and is_on and is_off and "could not be made safe" not in said
-    verdict(name, good, f"{before} before, {module()} {took:.1f} s after" if good else f"{before} {module()} {said[-1500:]}")
+    after = modules()
+    good = process.returncode == 1 and all(before.values()) and not any(after.values()) and "could not be made safe" not in said
+    verdict(name, good, f"{len(before)} on before, none {took:.1f} s after" if good else f"{before} {after} {said[-1500:]}")
 
 
 def at_the_robot(_, run):
@@ -280,6 +348,8 @@ os.makedirs(FOLDER)
 for file in FILES:
     with robot(pipettes(pathlib.Path(file).read_text())):
         whole(file)
+for file in PLAYED:
+    plays(file)
 FIRST = pathlib.Path(FILES[0]).read_text()
 with robot(pipettes(FIRST)):
     played(FIRST)

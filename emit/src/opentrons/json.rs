@@ -27,7 +27,8 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Vec<u8> {
         .iter()
         .map(|(id, name)| (id.clone(), json!({ "displayName": name, "description": "" })))
         .collect();
-    let definitions: Map<String, Value> = protocol.definitions.iter().cloned().collect();
+    // Those of Opentrons too: the software of a robot may be older than the library.
+    let definitions: Map<String, Value> = protocol.definitions.iter().chain(&protocol.library).cloned().collect();
     let robot = |name: &str| protocol.robot.setting(name).unwrap_or_default();
     let document = json!({
         "$otSharedSchema": "#/protocol/schemas/8",

@@ -44,6 +44,8 @@ pub(super) struct Protocol<'p> {
     pub(super) liquids: Vec<(String, String)>,
     /// Labware definitions that Opentrons does not know by itself, by `NAMESPACE/NAME/VERSION`.
     pub(super) definitions: Vec<(String, Value)>,
+    /// Those of the labware used that it may know, in the version meant.
+    pub(super) library: Vec<(String, Value)>,
     /// Those of the labware used whose role is to bear other labware, which Python loads by a call of its own.
     pub(super) adapters: BTreeSet<String>,
     /// What is loaded.
@@ -68,6 +70,7 @@ impl<'p> Protocol<'p> {
                 robot,
                 liquids: Vec::new(),
                 definitions: Vec::new(),
+                library: Vec::new(),
                 adapters: BTreeSet::new(),
                 loads: Vec::new(),
                 commands: Vec::new(),
@@ -85,7 +88,7 @@ impl<'p> Protocol<'p> {
                 Deed::Wait(seconds) => writer.push("waitForDuration", json!({ "seconds": number(*seconds) }), at),
                 Deed::Note(text) => writer.push("comment", json!({ "message": text }), at),
                 Deed::Ask(text) => writer.push("waitForResume", json!({ "message": text }), at),
-                Deed::WaitUntil => {}
+                Deed::WaitUntil | Deed::Awaited { .. } => {}
             }
         }
         writer.protocol

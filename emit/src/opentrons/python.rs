@@ -179,7 +179,8 @@ impl Script {
                     self.line(&format!("{place}.load_liquid({}, {})", text("liquidId"), shown(Some(volume))));
                 }
             }
-            _ => return false,
+            // What brings a module into its state at the start.
+            _ => return self.call(command),
         }
         true
     }

@@ -46,7 +46,10 @@ impl Writer<'_, '_> {
         let here = match message.form.about {
             About::Robot => true,
             About::Pipette => belongs(self.protocol.subject, wired.device, robot),
-            About::Labware | About::Module => message.get("location").is_some_and(|l| self.deck.location(l).is_some()),
+            About::Labware | About::Module => match message.get("location") {
+                Some(location) => self.deck.location(location).is_some(),
+                None => self.deck.get(wired.device).is_some(),
+            },
             About::Well => self.deck.well(wired.device).is_some() && message.get("volume") != Some("0"),
         };
         if !here {
@@ -224,13 +227,20 @@ impl Writer<'_, '_> {
         if roles.is_some_and(|roles| roles.iter().any(|role| role == "adapter")) {
             self.protocol.adapters.insert(uri.to_owned());
         }
-        if *space != OWN && !self.protocol.definitions.iter().any(|(known, _)| known == uri) {
-            let Some(found) = found else {
+        let known = |all: &[(String, Value)]| all.iter().any(|(known, _)| known == uri);
+        match found {
+            Some(found) if *space == OWN && !known(&self.protocol.library) => {
+                self.protocol.library.push((uri.to_owned(), found))
+            }
+            Some(found) if *space != OWN && !known(&self.protocol.definitions) => {
+                self.protocol.definitions.push((uri.to_owned(), found))
+            }
+            None if *space != OWN => {
                 let headline = format!("the definition `{uri}` of `{}` was not found", instance.name);
                 let help = "import the asset `from labware \"FILE.json\"`";
                 return Err(not_expressible(instance.span, headline, "its own definition").help(help));
-            };
-            self.protocol.definitions.push((uri.to_owned(), found));
+            }
+            _ => {}
         }
         Ok(())
     }

@@ -125,7 +125,7 @@ impl Script<'_> {
                 Deed::Wait(seconds) => self.line(&format!("sleep({})", number(*seconds))),
                 Deed::Note(text) => self.line(&format!("textmsg({})", quoted(text))),
                 Deed::Ask(text) => self.line(&format!("popup({}, title=\"matterixc\", blocking=True)", quoted(text))),
-                Deed::WaitUntil => {}
+                Deed::WaitUntil | Deed::Awaited { .. } => {}
                 Deed::Operation(_) => {
                     let begins = |t: &&&Travel| t.step == act.step && t.begins >= act.time;
                     match own.get(next).filter(begins) {

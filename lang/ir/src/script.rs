@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::plan::StepId;
+use crate::plan::{Condition, StepId};
 use crate::scene::InstanceId;
-use crate::{Span, Text};
+use crate::{NodeId, Span, Text};
 
 /// Everything that is said for one program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,9 @@ pub struct Wiring {
     pub devices: Vec<Wired>,
     /// What an operation says when it begins, for those whose device has a line for it.
     pub steps: BTreeMap<StepId, Vec<Message>>,
+    /// Where devices wait by themselves instead for a condition: a wait of no time after that, and the condition, which must hold then.
+    #[serde(default)]
+    pub awaited: BTreeMap<StepId, Condition>,
     /// Each operation as it is called, with its values.
     pub calls: BTreeMap<StepId, Text>,
     /// Texts of the files that assets come from, by what the asset's text says after `from`.
@@ -60,4 +63,7 @@ pub struct Message {
     pub text: Text,
     /// Where the driver says it.
     pub span: Span,
+    /// It is said only if this holds as the workflow begins.
+    #[serde(default)]
+    pub condition: Option<NodeId>,
 }

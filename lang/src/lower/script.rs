@@ -1,13 +1,15 @@
 //! Drivers for files that other programs run: what stands there for a command, as texts with values.
 
-use matterix_ir::plan::{Step, StepId};
+use std::collections::BTreeSet;
+
+use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::script::{Message, Wired, Wiring};
-use matterix_ir::{Diagnostic, Span, TextPart, codes};
+use matterix_ir::{Diagnostic, NodeId, Op, Span, TextPart, codes};
 
 use super::Planner;
 use super::call::Bound;
-use crate::ast::{Arg, Exchange, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind};
+use crate::ast::{Arg, ClauseKind, Exchange, Expr, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind};
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 
@@ -34,9 +36,9 @@ struct Driver<'a> {
 }
 
 /// What is said before anything else.
-fn opening(wire: &Wire) -> Option<&Exchange> {
+fn opening(wire: &Wire) -> Option<(&Exchange, Option<&Expr>)> {
     match &wire.kind {
-        WireKind::Fixed { when, exchange, .. } if when.text == OPEN => Some(exchange),
+        WireKind::Fixed { when, exchange, condition } if when.text == OPEN => Some((exchange, condition.as_ref())),
         _ => None,
     }
 }
@@ -100,6 +102,67 @@ impl<'a> Planner<'a, '_> {
         }
     }
 
+    /// The waits of devices' own that a file says in place of a wait for a condition: commands without arguments that last until something holds, such as
+    /// `settle MODULE`, if the condition depends on nothing else that changes than theirs do.
+    pub(super) fn own_waits(&mut self, condition: &Condition, span: Span) -> Vec<StepId> {
+        let Some(transport) = self.wiring.as_ref().map(|w| w.transport.clone()).filter(|_| !self.draft) else {
+            return Vec::new();
+        };
+        let mut open = self.states_of(condition.node);
+        let mut waits = Vec::new();
+        for id in (0..self.lab.instances.len() as u32).map(InstanceId) {
+            if open.is_empty() {
+                return waits;
+            }
+            let drivers = self.drivers_of(id, &transport);
+            let lines = drivers.iter().flat_map(|d| d.wires);
+            let said: Vec<&Sig> = lines
+                .filter_map(|wire| match &wire.kind {
+                    WireKind::Command { sig, .. } if sig.all_params().next().is_none() => Some(sig),
+                    _ => None,
+                })
+                .collect();
+            let own: Vec<_> = self.lab.all_members(id).to_vec();
+            for m in own {
+                let MemberKind::Command { sig, clauses } = &m.member.kind else { continue };
+                let lasts = clauses.iter().find_map(|clause| match &clause.kind {
+                    ClauseKind::Until(e) => Some(e),
+                    _ => None,
+                });
+                let Some(lasts) = lasts.filter(|_| said.iter().any(|line| fits(line, sig))) else { continue };
+                let mut scope = Scope::of_member(id, m);
+                let Some(until) = self.lab.truth(lasts, &mut scope) else { continue };
+                let covered = self.states_of(until);
+                if !open.iter().any(|state| covered.contains(state)) {
+                    continue;
+                }
+                let bound = Bound { values: Vec::new() };
+                let Some((mut operation, _)) = self.operation(sig, clauses, &bound, &mut scope) else { continue };
+                operation.device = Some(id);
+                operation.claims.insert(0, id);
+                let label = format!("{} {}", verb_text(&sig.verb), self.lab.instances[id.0 as usize].name);
+                let step = self.add(label, span, Step::Operation(Box::new(operation)));
+                self.say(id, sig, &bound, step);
+                self.note_call(sig, &bound, Some((id, true)), step);
+                waits.push(step);
+                open.retain(|state| !covered.contains(state));
+                break;
+            }
+        }
+        if open.is_empty() { waits } else { Vec::new() }
+    }
+
+    /// The states that a value depends on; none where it depends on anything else that changes.
+    fn states_of(&self, node: NodeId) -> BTreeSet<u32> {
+        let (mut states, mut other) = (BTreeSet::new(), false);
+        self.lab.graph.visit(node, |op| match op {
+            Op::State(state) => drop(states.insert(state)),
+            Op::Time | Op::Reading(_) | Op::Local(_) => other = true,
+            _ => {}
+        });
+        if other { BTreeSet::new() } else { states }
+    }
+
     /// Notes an operation as it is called, with its values in place of the arguments.
     pub(super) fn note_call(&mut self, sig: &Sig, bound: &Bound, device: Option<(InstanceId, bool)>, step: StepId) {
         if self.draft || self.wiring.is_none() {
@@ -142,7 +205,8 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn messages(&mut self, sends: &'a [Text], scope: &mut Scope) -> Vec<Message> {
-        sends.iter().filter_map(|text| Some(Message { text: self.lab.filled(text, scope)?, span: text.span })).collect()
+        let message = |text, span| Message { text, span, condition: None };
+        sends.iter().filter_map(|text| Some(message(self.lab.filled(text, scope)?, text.span))).collect()
     }
 
     /// The wiring with all devices, where it is asked for.
@@ -158,9 +222,13 @@ impl<'a> Planner<'a, '_> {
             if let Some(first) = drivers.iter().find(has_open) {
                 let mut scope = Scope::of(id, first.module);
                 for wire in first.wires {
-                    if let Some(exchange) = opening(wire) {
-                        said.extend(self.messages(&exchange.sends, &mut scope));
-                    }
+                    let Some((exchange, condition)) = opening(wire) else { continue };
+                    let condition = match condition.map(|c| self.lab.truth(c, &mut scope)) {
+                        Some(None) => continue,
+                        known => known.flatten(),
+                    };
+                    let messages = self.messages(&exchange.sends, &mut scope).into_iter();
+                    said.extend(messages.map(|m| Message { condition, ..m }));
                 }
             }
             let mut settings: Vec<(String, String)> = Vec::new();
@@ -223,12 +291,13 @@ impl<'a> Planner<'a, '_> {
                     }
                     self.messages(&exchange.sends, &mut scope);
                 }
-                WireKind::Fixed { condition: Some(condition), .. } => {
-                    self.not_said(driver.transport, condition.span, "conditions");
-                }
-                WireKind::Fixed { when, exchange, .. } if when.text == OPEN => {
+                WireKind::Fixed { when, exchange, condition } if when.text == OPEN => {
                     self.only_sends(driver.transport, wire, exchange);
-                    self.messages(&exchange.sends, &mut Scope::of(device, driver.module));
+                    let mut scope = Scope::of(device, driver.module);
+                    if let Some(condition) = condition {
+                        self.lab.truth(condition, &mut scope);
+                    }
+                    self.messages(&exchange.sends, &mut scope);
                 }
                 WireKind::Fixed { when, .. } => {
                     let what = format!("lines for `{}`", when.text);

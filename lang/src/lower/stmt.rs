@@ -89,7 +89,18 @@ impl<'a> Planner<'a, '_> {
             StmtKind::WaitUntil { cond, timeout, handlers } => {
                 let condition = self.deciding(cond, scope)?;
                 let timeout = self.optional_duration(timeout.as_ref(), scope)?;
-                let id = self.add(label.clone(), s.span, Step::WaitUntil { condition, timeout });
+                let mut waits = if timeout.is_none() { self.own_waits(&condition, s.span) } else { Vec::new() };
+                if waits.is_empty() {
+                    let id = self.add(label.clone(), s.span, Step::WaitUntil { condition, timeout });
+                    return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+                }
+                let duration = self.lab.graph.number(0.0);
+                let after = self.add(label.clone(), s.span, Step::Wait { duration });
+                if let Some(wiring) = &mut self.wiring {
+                    wiring.awaited.insert(after, condition);
+                }
+                waits.push(after);
+                let id = self.add(label.clone(), s.span, Step::Sequence(waits));
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::Hold { cond, duration, timeout, handlers } => {
