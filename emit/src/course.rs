@@ -147,9 +147,7 @@ pub fn open(
             ),
             Step::Wait { .. } if wiring.awaited.contains_key(&StepId(index as u32)) => {
                 let never = |a: &Act| a.step.0 as usize == index && a.deed == Deed::Awaited { holds: false };
-                if let (true, Some(condition)) =
-                    (acts.iter().any(never), wiring.awaited.get(&StepId(index as u32)))
-                {
+                if let (true, Some(condition)) = (acts.iter().any(never), wiring.awaited.get(&StepId(index as u32))) {
                     say(
                         own(condition.span),
                         format!("{what} would go on before `{}` holds", condition.text),

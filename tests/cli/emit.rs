@@ -296,3 +296,76 @@ fn drivers_over_opentrons_are_checked_where_they_are_declared() {
         assert_eq!(found.iter().map(|l| l["code"].as_str().unwrap_or("")).collect::<Vec<_>>(), [code], "{wires}");
     }
 }
+
+/// A deck with a temperature module, a heater-shaker and a thermocycler.
+fn modules(lines: &str) -> String {
+    format!(
+        r#"mtx 1
+use std::opentrons::{{Corning96, HeaterShaker, OT2, P300Single, TemperatureModule, ThermocyclerGen2, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Single }} at (0, 0, 0) m
+    shaker = HeaterShaker {{ latch: closed }} on ot2.slot[1]
+    cold = TemperatureModule on ot2.slot[3]
+    plate = Corning96 on cold holding {{ A1: 100 uL of water }}
+    cycler = ThermocyclerGen2 on ot2.slot[7]
+}}
+workflow w in deck {{
+    heat cold to 37 degC
+    heat shaker to 45 degC
+{lines}
+}} finally {{
+    stop heating cold
+    stop heating shaker
+}}
+"#
+    )
+}
+
+#[test]
+fn a_wait_for_a_module_is_its_own_wait() {
+    let dir = folder("emit_own_waits");
+    write(&dir, "lab.mtx", modules("    wait until cold.temperature >= 36 degC and shaker.temperature > 44 degC"));
+    let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let waits = "    shaker.wait_for_temperature()\n    cold.await_temperature(37)\n";
+    assert!(ended.out.contains(waits), "{}", ended.out);
+    // The module goes on at its set point, where this does not hold.
+    let passing = "    wait until cold.temperature in 25 degC .. 30 degC";
+    let said = flat(&refused("emit_passing", &modules(passing), "opentrons-json"));
+    assert!(said.contains("would go on before `cold.temperature in 25 degC .. 30 degC` holds"), "{said}");
+    // What is in the wells no module waits for.
+    let wells = "    wait until plate[A1].contents.temperature > 30 degC";
+    let said = flat(&refused("emit_wells", &modules(wells), "opentrons-json"));
+    assert!(said.contains("cannot wait for `plate[A1].contents.temperature > 30 degC`"), "{said}");
+}
+
+#[test]
+fn modules_begin_as_the_lab_has_them() {
+    let dir = folder("emit_begins");
+    write(&dir, "lab.mtx", modules("    settle cold"));
+    let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(
+        ended.out.contains("    cycler.open_lid()\n") && ended.out.contains("    shaker.close_labware_latch()\n"),
+        "{}",
+        ended.out
+    );
+    write(
+        &dir,
+        "lab.mtx",
+        modules("    settle cold").replace("ThermocyclerGen2 on", "ThermocyclerGen2 { lid: closed } on"),
+    );
+    let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python"]);
+    assert!(ended.code == 0 && !ended.out.contains("open_lid"), "{}{}", ended.out, ended.err);
+}
+
+#[test]
+fn json_brings_the_definitions_of_its_labware() {
+    let dir = folder("emit_definitions");
+    write(&dir, "lab.mtx", modules("    settle cold"));
+    let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json"]);
+    let document: Value = serde_json::from_str(&ended.out).expect("a JSON document");
+    let definition = &document["labwareDefinitions"]["opentrons/corning_96_wellplate_360ul_flat/2"];
+    assert_eq!(definition["wells"].as_object().map(|wells| wells.len()), Some(96));
+}

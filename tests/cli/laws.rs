@@ -450,3 +450,49 @@ fn laws_over_pairs_and_more_exist_once_per_pair() {
     let both = served("top") + &served("bottom");
     passes("both", &text("a: Tank, b: Tank, r: Room", "near(a, b) and serves(r, a) and serves(r, b)", &both, once));
 }
+
+#[test]
+fn a_command_that_is_declared_again_replaces_the_inherited_one() {
+    let text = r#"mtx 1
+capability Base: Body {
+    state n: Ratio = 0
+    command poke
+        effect n = 1
+    command prod at(x: Ratio)
+        effect n = x
+    command prod at(x: Ratio) using(y: Ratio)
+        effect n = x + y
+}
+capability Better: Base {
+    command poke
+        effect n = 2
+    command prod at(x: Ratio)
+        option far: Bool = false
+        effect n = choose(far, 100, 10) * x
+}
+asset Old: Base { mass: 1 g, shape: box(1 mm, 1 mm, 1 mm) }
+asset New: Better { mass: 1 g, shape: box(1 mm, 1 mm, 1 mm) }
+lab l {
+    ambient: 20 degC
+    old = Old at (0, 0, 0) m
+    new = New at (1, 0, 0) m
+}
+workflow w in l {
+    poke old
+    expect old.n == 1
+    poke new
+    expect new.n == 2
+    prod old at 3
+    expect old.n == 3
+    prod new at 3
+    expect new.n == 30
+    prod new at 3 { far: true }
+    expect new.n == 300
+    prod new at 3 using 4
+    expect new.n == 7
+}
+"#;
+    let file = write(&folder("laws_replaced"), "law.mtx", text);
+    let ended = matterixc(&["run", &file]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}

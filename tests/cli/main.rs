@@ -12,6 +12,7 @@ mod budget;
 mod chosen;
 mod contact;
 mod contents;
+mod cyclers;
 mod delayed;
 mod deploy;
 mod determinism;

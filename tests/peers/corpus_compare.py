@@ -186,8 +186,8 @@ class Reader:
                 self.say(kind, about, *frozen(rest))
 
     def block(self, module, celsius, params):
-        """A set point of a thermocycler, with the volume that it allows for."""
-        self.say("thermocycler/setTargetBlockTemperature", module, celsius, params.get("blockMaxVolumeUl"))
+        """A set point of a thermocycler, with the volume that it allows for: its firmware has 25 uL where none is given."""
+        self.say("thermocycler/setTargetBlockTemperature", module, celsius, params.get("blockMaxVolumeUl") or 25)
 
     def held(self, module, seconds):
         """Its temperature is waited for, and held."""

@@ -9,7 +9,9 @@ use matterix_ir::{Diagnostic, NodeId, Op, Span, TextPart, codes};
 
 use super::Planner;
 use super::call::Bound;
-use crate::ast::{Arg, ClauseKind, Exchange, Expr, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind};
+use crate::ast::{
+    Arg, ClauseKind, Exchange, Expr, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind,
+};
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 

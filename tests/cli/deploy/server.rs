@@ -15,6 +15,10 @@ use crate::harness::{Ended, flat, folder, matterixc_in, write};
 const TRANSFER: &str = include_str!("../../deploy/transfer.mtx");
 const RECORDED: &str = include_str!("../../deploy/transfer.jsonl");
 
+/// The same with every module, and labware on modules, on an adapter and on a block.
+const MODULES: &str = include_str!("../../deploy/modules.mtx");
+const RECORDED_MODULES: &str = include_str!("../../deploy/modules.jsonl");
+
 /// What becomes of one command.
 #[derive(Clone)]
 enum Spoiled {
@@ -33,8 +37,10 @@ struct Replay {
     left: Arc<Mutex<usize>>,
 }
 
-fn replay(spoiled: Option<(&'static str, Spoiled)>) -> Replay {
-    let mut recorded: Vec<Value> = RECORDED.lines().map(|l| serde_json::from_str(l).expect("recorded")).collect();
+fn replay(recorded: &str, spoiled: Option<(&'static str, Spoiled)>) -> Replay {
+    let mut recorded: Vec<Value> = recorded.lines().map(|l| serde_json::from_str(l).expect("recorded")).collect();
+    // Whether a person has stopped it is asked for by the clock.
+    recorded.retain(|e| !looks(e["method"].as_str().unwrap_or_default(), e["path"].as_str().unwrap_or_default()));
     recorded.iter_mut().for_each(|e| placed(&mut e["body"]));
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
@@ -60,6 +66,11 @@ fn placed(body: &mut Value) {
     }
 }
 
+/// Whether a request asks how a run stands.
+fn looks(method: &str, path: &str) -> bool {
+    method == "GET" && path.starts_with("/runs/") && path.matches('/').count() == 2
+}
+
 /// Serves one connection.
 fn serve(
     stream: TcpStream,
@@ -76,10 +87,8 @@ fn serve(
         let expected = recorded.get(*next);
         let same = |e: &Value| e["method"] == method.as_str() && e["path"] == path.as_str() && e["body"] == body;
         *stopped |= body["data"]["actionType"] == "stop";
-        // Whether a person has stopped it is asked for all the time.
-        let looks = method == "GET" && path.starts_with("/runs/") && path.matches('/').count() == 2;
         let (status, answer) = match (expected, spoiled) {
-            _ if looks => (200, json!({ "data": { "status": if *stopped { "stopped" } else { "running" } } })),
+            _ if looks(&method, &path) => (200, json!({ "data": { "status": if *stopped { "stopped" } else { "running" } } })),
             _ if version != "4" => (422, json!({ "errors": [{ "id": "InvalidRequest", "detail": "no version" }] })),
             (Some(e), Some((at, how))) if same(e) && *at == name => match how {
                 Spoiled::Cut => return,
@@ -139,18 +148,49 @@ fn bench(name: &str, address: &str) -> PathBuf {
 
 #[test]
 fn a_plan_completes_against_the_recorded_exchange() {
-    let server = replay(None);
-    let dir = bench("replay", &server.address);
+    for (name, text, recorded) in [("replay", TRANSFER, RECORDED), ("replay_modules", MODULES, RECORDED_MODULES)] {
+        let server = replay(recorded, None);
+        let dir = bench(name, &server.address);
+        write(&dir, "lab.mtx", text);
+        let ended = deploy(&dir, &["--mode", "real"]);
+        assert_eq!(*server.wrong.lock().expect("not poisoned"), Vec::<String>::new());
+        assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+        // The connection is closed with the command.
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        assert_eq!(*server.left.lock().expect("not poisoned"), 0, "nothing of it is left out");
+    }
+}
+
+#[test]
+fn modules_work_on_the_emulated_robot_and_none_is_left_on() {
+    let dir = bench("modules", "");
+    write(&dir, "lab.mtx", MODULES);
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", emulated.address));
     let ended = deploy(&dir, &["--mode", "real"]);
-    assert_eq!(*server.wrong.lock().expect("not poisoned"), Vec::<String>::new());
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
-    // The connection is closed with the command.
-    std::thread::sleep(std::time::Duration::from_millis(100));
-    assert_eq!(*server.left.lock().expect("not poisoned"), 0, "nothing of it is left out");
+    // A run that ends badly switches each of them off, by the identifier that the server gives to it.
+    let off = [
+        "heaterShaker/deactivateHeater",
+        "heaterShaker/deactivateShaker",
+        "temperatureModule/deactivate",
+        "magneticModule/disengage",
+        "thermocycler/deactivateBlock",
+        "thermocycler/deactivateLid",
+    ];
+    let server = replay(RECORDED_MODULES, Some(("aspirate", Spoiled::Cut)));
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", server.address));
+    std::fs::remove_file(dir.join("journal")).expect("a journal");
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    let journal = std::fs::read_to_string(dir.join("journal")).expect("a journal");
+    for kind in off {
+        assert!(journal.lines().any(|l| l.contains("/commands?") && l.contains(kind)), "{kind}: {journal}");
+    }
 }
 
 fn spoil(name: &str, at: &'static str, how: Spoiled) -> Ended {
-    let server = replay(Some((at, how)));
+    let server = replay(RECORDED, Some((at, how)));
     deploy(&bench(name, &server.address), &["--mode", "real"])
 }
 

@@ -1,5 +1,6 @@
 //! What a lab offers to others: every command of its devices, written out apart from any workflow, and what they show.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use matterix_ir::graph::Op;
@@ -52,7 +53,7 @@ impl<'a> Planner<'a, '_> {
 
     fn offer(&mut self, id: InstanceId, m: MemberRef<'a>) {
         let MemberKind::Command { sig, clauses } = &m.member.kind else { return };
-        let arrangements = self.arrangements(sig, clauses, "", id, m.module, None);
+        let arrangements = self.arrangements((sig, clauses, ""), &BTreeSet::new(), id, m.module, None);
         if arrangements.len() > MOST {
             return;
         }
@@ -113,7 +114,7 @@ impl<'a> Planner<'a, '_> {
         for id in names.declared_by(module).collect::<Vec<_>>() {
             let item = names.decl(id).item;
             let ItemKind::Skill { sig, clauses, body: Some(body), handlers, .. } = &item.kind else { continue };
-            let arrangements = self.arrangements(sig, clauses, "", InstanceId(0), module, None);
+            let arrangements = self.arrangements((sig, clauses, ""), &BTreeSet::new(), InstanceId(0), module, None);
             if arrangements.len() > MOST {
                 continue;
             }

@@ -1,5 +1,7 @@
 //! Commands of a device apart from any plan: for emulators, for what is repeated, and to check a driver by itself.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::plan::{Condition, Operation};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Served;
@@ -11,7 +13,7 @@ use crate::declare::Type;
 use crate::eval::{Num, Scope, Value};
 use crate::lower::Planner;
 use crate::lower::call::Bound;
-use crate::names::{DeclId, verb_text};
+use crate::names::{DeclId, names_in, verb_text};
 
 /// Values of parameters, and the locals among them.
 #[derive(Clone, Default)]
@@ -43,7 +45,13 @@ impl<'a> Planner<'a, '_> {
                 _ => return Vec::new(),
             },
         };
-        let arrangements = self.arrangements(sig, clauses, own, instance, of, host);
+        let mut said = BTreeSet::new();
+        for part in exchange.sends.iter().flat_map(|text| &text.parts) {
+            if let ast::TextPart::Value { value, .. } = part {
+                names_in(value, &mut said);
+            }
+        }
+        let arrangements = self.arrangements((sig, clauses, own), &said, instance, of, host);
         let mut out = Vec::new();
         for Arrangement { values, locals: arguments } in arrangements {
             let mut scope = Scope::of(instance, module);
@@ -62,12 +70,11 @@ impl<'a> Planner<'a, '_> {
         out
     }
 
-    /// Every arrangement of the things that a command is about, as far as the lab has them.
+    /// Every arrangement of the things that a command is about, as far as the lab has them; `said` are the names that a line mentions.
     pub(super) fn arrangements(
         &mut self,
-        sig: &'a Sig,
-        clauses: &'a [Clause],
-        own: &str,
+        (sig, clauses, own): (&'a Sig, &'a [Clause], &str),
+        said: &BTreeSet<&str>,
         instance: InstanceId,
         of: usize,
         host: Option<InstanceId>,
@@ -82,7 +89,10 @@ impl<'a> Planner<'a, '_> {
             let name = p.name.text.clone();
             let (values, local): (Vec<Value>, Option<u32>) = match ty {
                 _ if name == own => (vec![Value::Instance(instance)], None),
-                // What the command takes where nothing is said: a line says nothing of it.
+                Some(ty) if is_option && said.contains(name.as_str()) && !matches!(ty, Type::Instance { .. } | Type::List(_)) => {
+                    self.open_value(&ty, &name)
+                }
+                // What the command takes where nothing is said, as the line says nothing of it.
                 ty if is_option && p.default.is_some() => {
                     let value = p
                         .default

@@ -30,8 +30,8 @@ pub struct Json {
     speaker: Option<(InstanceId, InstanceId)>,
     /// The server's end: what it gave out under these words.
     issued: BTreeSet<(String, String)>,
-    /// The server's end: what it gave out last under each word.
-    latest: BTreeMap<String, String>,
+    /// The server's end: what it gave out last under each word, by the device that it was for.
+    latest: Kept,
 }
 
 /// What answers said, by the device they were for and the word it is kept under.
@@ -189,18 +189,30 @@ impl Json {
         let mut out = String::with_capacity(text.len());
         for (i, word) in text.split(' ').enumerate() {
             out.push_str(if i > 0 { " " } else { "" });
-            match word.split_once('=').and_then(|(pointer, value)| Some((pointer, message::kept(value)?))) {
-                Some((pointer, kept)) => {
-                    let name = format!("{kept}-{}", self.issued.len() + 1);
-                    let pointer = message::chosen(pointer, |word| self.latest.get(word).cloned());
-                    out.push_str(&format!("{pointer}='{name}'"));
-                    self.latest.insert(kept.to_owned(), name.clone());
-                    self.issued.insert((kept.to_owned(), name));
-                }
-                None => out.push_str(word),
+            let Some((pointer, value)) = word.split_once('=') else {
+                out.push_str(word);
+                continue;
+            };
+            let pointer = message::chosen(pointer, |word| self.given_out(word));
+            let Some(kept) = message::kept(value) else {
+                out.push_str(&format!("{pointer}={value}"));
+                continue;
+            };
+            let name = format!("{kept}-{}", self.issued.len() + 1);
+            out.push_str(&format!("{pointer}='{name}'"));
+            if let Some((own, _)) = self.speaker {
+                self.latest.insert((own, kept.to_owned()), name.clone());
             }
+            self.issued.insert((kept.to_owned(), name));
         }
         out
+    }
+
+    /// The server's end: what it gave out last under a word to the device that it speaks to, or to the one whose line that is.
+    fn given_out(&self, word: &str) -> Option<String> {
+        let of = |device| self.latest.get(&(device, word.to_owned())).cloned();
+        let (own, host) = self.speaker?;
+        of(own).or_else(|| of(host))
     }
 
     /// Whether a message puts in something that no answer has said.

@@ -10,7 +10,7 @@ use std::time::Duration;
 use cavro::Cavro;
 use frame::Frame;
 pub use json::{Json, Kept, LONGEST as LONGEST_JSON};
-use matterix_ir::wire::{Framing, Pattern, Slot, Template};
+use matterix_ir::wire::{Driver, Framing, Pattern, Slot, Template};
 
 use crate::pattern::{self, Said, Shown};
 use crate::template::{self, Found};
@@ -225,6 +225,21 @@ impl Codec {
             Codec::Json(json) => json.named(&text),
             _ => text,
         })
+    }
+
+    /// The device's end: what is said next is for the device of this driver.
+    pub fn speak_for(&mut self, driver: &Driver) {
+        if let Codec::Json(json) = self {
+            json.speak_for(driver);
+        }
+    }
+
+    /// The device's end: an answer that several drivers ask for in the same words; each finds what it expects. Only servers give such answers.
+    pub fn joined(&self, answers: &[String]) -> Option<String> {
+        let Codec::Json(_) = self else { return None };
+        let (first, rest) = answers.split_first()?;
+        let fields = rest.iter().filter_map(|answer| Some(answer.split_once(' ')?.1));
+        Some(std::iter::once(first.as_str()).chain(fields).collect::<Vec<_>>().join(" "))
     }
 
     /// The device's end: an answer that means a failure, by its name and in words where it has room for them.

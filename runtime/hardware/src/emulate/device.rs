@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::plan::{Condition, Operation};
-use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Slot, Template, Told};
+use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Slot, Template, Told, Until};
 use matterix_ir::{Span, codes};
 use matterix_runtime::backend::{Backend, Sim, Status, Ticket};
 use matterix_runtime::fault::Fault;
@@ -165,6 +165,9 @@ impl<'m> Device<'_, 'm> {
     }
 
     fn word(&mut self, word: &str) -> Result<Option<Reply>, Fault> {
+        if let Some(text) = self.asked_by_several(word)? {
+            return Ok(Some(Reply::of(text)));
+        }
         if let Some(told) = self.asked(word) {
             return Ok(Some(Reply::of(self.tells(told)?)));
         }
@@ -175,6 +178,7 @@ impl<'m> Device<'_, 'm> {
         let answer = self.answer(word);
         for until in endings {
             if self.codec.found(&until.asks, word).is_some() {
+                self.speak_for(|driver| is_of(driver, until));
                 let text = match &until.expects {
                     Some(pattern) if self.running.is_empty() => self.plain(pattern),
                     Some(_) => answer.transpose()?.unwrap_or_else(|| "BUSY".to_owned()),
@@ -196,10 +200,38 @@ impl<'m> Device<'_, 'm> {
                     self.running.drain(..).for_each(|(ticket, _)| self.sim.halt(ticket));
                 }
                 *self.said = Some(exchange);
+                self.speak_for(|driver| fixed(driver).any(|(of, _)| std::ptr::eq(of, exchange)));
                 return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p.of(place)))));
             }
         }
         Ok(self.refuse(NOT_UNDERSTOOD, &format!("the driver has no line like `{}`", cut(word))))
+    }
+
+    /// What is said next is for the device of the driver to which this applies.
+    fn speak_for(&mut self, applies: impl Fn(&Driver) -> bool) {
+        if let Some(driver) = self.drivers.iter().find(|driver| applies(driver)) {
+            self.codec.speak_for(driver);
+        }
+    }
+
+    /// The answer of a server to a question that several devices at it ask, or one for several reasons: that of each.
+    fn asked_by_several(&mut self, word: &str) -> Result<Option<String>, Fault> {
+        let drivers = self.drivers;
+        let mut answers = Vec::new();
+        for driver in drivers {
+            self.codec.speak_for(driver);
+            let told = driver.told.iter().filter(|t| t.heard.is_none());
+            for told in told.filter(|t| self.codec.found(&t.asks, word).is_some()).collect::<Vec<_>>() {
+                answers.push(self.tells(told)?);
+            }
+            for exchange in driver.open.iter().filter(|e| e.until.is_none() && e.sends.len() == 1) {
+                let asks = exchange.sends.iter().any(|t| self.codec.is_word(&template::written(t), word));
+                if let (true, Some(expects)) = (asks, &exchange.expects) {
+                    answers.push(self.plain(expects.of(0)));
+                }
+            }
+        }
+        Ok(if answers.len() > 1 { self.codec.joined(&answers) } else { None })
     }
 
     /// An answer without numbers of its own.
@@ -378,6 +410,12 @@ fn refusal(word: &str, verb: &str, need: &Condition) -> String {
     let help = need.refusal.as_ref().and_then(|r| r.help.as_ref()).map_or(String::new(), |help| format!(": {help}"));
     let failure = need.failure().replace('_', " ");
     format!("`{}`, `{verb}`, is refused: {failure}{help} (`{}` is false)", cut(word), need.text)
+}
+
+/// Whether it is for the end of something that a driver says.
+fn is_of(driver: &Driver, until: &Until) -> bool {
+    let served = driver.served.iter().map(|s| &s.exchange);
+    served.chain(&driver.open).any(|e| e.until.as_ref().is_some_and(|of| std::ptr::eq(of, until)))
 }
 
 /// What is said apart from commands, and whether it breaks off what the device does.

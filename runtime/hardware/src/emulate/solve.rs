@@ -36,20 +36,24 @@ pub fn solve(served: &Served, found: &[Found], engine: &mut Engine<'_>) -> bool 
     open.is_empty()
 }
 
-/// Solves for one argument what is straight in it.
+/// Where a line is laid through what depends on one argument: some have another meaning at zero, such as the usual rate.
+const POINTS: [(f64, f64); 2] = [(0.0, 1.0), (1.0, 2.0)];
+
+/// Solves for one argument what is straight in it, beside zero or with it.
 fn straight(found: &Found, local: u32, engine: &mut Engine<'_>) -> bool {
     let mut at = |x: f64| {
         engine.set_local(local, x);
         engine.eval(found.node)
     };
-    let (zero, one) = (at(0.0), at(1.0));
-    let slope = one - zero;
-    if !slope.is_finite() || slope == 0.0 {
-        return false;
-    }
-    let x = (found.value - zero) / slope;
-    let back = at(x);
-    (back - found.value).abs() <= found.precision.max(1e-9 * found.value.abs()) + 1e-12
+    POINTS.into_iter().any(|(near, far)| {
+        let (first, second) = (at(near), at(far));
+        let slope = (second - first) / (far - near);
+        if !slope.is_finite() || slope == 0.0 {
+            return false;
+        }
+        let x = near + (found.value - first) / slope;
+        (at(x) - found.value).abs() <= found.precision.max(1e-9 * found.value.abs()) + 1e-12
+    })
 }
 
 /// The locals that a node depends on.
