@@ -369,3 +369,51 @@ fn json_brings_the_definitions_of_its_labware() {
     let definition = &document["labwareDefinitions"]["opentrons/corning_96_wellplate_360ul_flat/2"];
     assert_eq!(definition["wells"].as_object().map(|wells| wells.len()), Some(96));
 }
+
+#[test]
+fn labware_that_a_person_moves_is_moved_in_the_protocol() {
+    let dir = folder("emit_moves");
+    let text = r#"mtx 1
+use std::furniture::LabBench
+use std::opentrons::{Corning96, HeaterShaker, OT2, P300Single, Reservoir12, TipRack300}
+lab deck {
+    ambient: 22 degC
+    ot2 = OT2 { left: P300Single } at (0, 0, 0) m
+    table = LabBench at (0, -1.5, 0) m
+    tips = TipRack300 on ot2.slot[5]
+    shaker = HeaterShaker on ot2.slot[1]
+    stock = Reservoir12 on ot2.slot[3] holding { A1: 5 mL of water }
+    plate = Corning96 on ot2.slot[6]
+    second = Corning96 on table
+}
+workflow w in deck {
+    relocate plate to shaker
+    close latch shaker
+    transfer 50 uL from stock[A1] to plate[B1] by ot2.left using tips { tips: once }
+    relocate second to ot2.slot[6]
+    transfer 50 uL from stock[A1] to second[B1] by ot2.left using tips { tips: once }
+    open latch shaker
+    relocate plate to table
+    expect plate[B1].contents.volume in 49.9 uL .. 50.1 uL
+}
+"#;
+    write(&dir, "lab.mtx", text);
+    let checked = matterixc_in(&dir, &["check", "--strict", "lab.mtx"]);
+    assert_eq!(checked.code, 0, "{}", checked.out);
+    let python = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python"]).out;
+    let lines = ["(plate, shaker)", "(second, \"6\")", "(plate, protocol_api.OFF_DECK)"];
+    let at: Vec<_> = lines.iter().map(|l| python.find(&format!("    protocol.move_labware{l}\n"))).collect();
+    assert!(at.iter().all(Option::is_some) && at.is_sorted() && !python.contains("protocol.pause"), "{python}");
+    assert!(
+        python.contains("second = protocol.load_labware(\"corning_96_wellplate_360ul_flat\", protocol_api.OFF_DECK"),
+        "{python}"
+    );
+    // The latch holds it.
+    write(&dir, "lab.mtx", text.replace("    open latch shaker\n", ""));
+    let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
+    assert!(ended.code == 1 && ended.out.contains("error[latch-closed]"), "{}", ended.out);
+    // Its place is taken.
+    write(&dir, "lab.mtx", text.replace("    relocate plate to shaker\n    close", "    close"));
+    let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
+    assert!(ended.code == 1 && ended.out.contains("error[occupied]"), "{}", ended.out);
+}

@@ -833,3 +833,38 @@ fn transfers_have_heights_rates_air_and_touches() {
     let emitted = matterixc_in(&dir, &["emit", "b.mtx", "--target", "opentrons-python"]);
     assert_eq!(emitted.out.matches("aspirate(150, stock").count(), 2, "{}{}", emitted.out, emitted.err);
 }
+
+#[test]
+fn labware_that_is_moved_or_brought_is_imported() {
+    let moved = |id: &str, to: Value| {
+        command("moveLabware", json!({ "labwareId": id, "newLocation": to, "strategy": "manualMoveWithPause" }))
+    };
+    let plate = || definition("wellPlate", 8, 12, [DEPTHS[0], 6.86, 360.0]);
+    let steps = vec![
+        moved("plate", json!("offDeck")),
+        load("second", ("corning_96_wellplate_360ul_flat", 2), "2", plate()),
+        at("pickUpTip", "tips", "A1", 0.0, json!({})),
+        at("aspirate", "stock", "A1", 2.0 - DEPTHS[1], json!({ "volume": 50.0, "flowRate": 92.86 })),
+        at("dispense", "second", "B2", 0.0, json!({ "volume": 50.0, "flowRate": 92.86 })),
+        at("dropTip", "fixedTrash", "A1", 0.0, json!({})),
+        moved("second", json!({ "slotName": "4" })),
+    ];
+    let (text, protocol) = imported("moved", steps);
+    for line in [
+        "use std::furniture::LabBench\n",
+        "    aside = LabBench at (0, -1.5, 0) m\n",
+        "    second = Corning96 on aside\n",
+        "    relocate plate to aside\n    moved second to ot2.slot[2]\n",
+        "    relocate second to ot2.slot[4]\n",
+    ] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    let moves: Vec<&Value> = protocol["commands"]
+        .as_array()
+        .expect("commands")
+        .iter()
+        .filter(|c| c["commandType"] == "moveLabware")
+        .map(|c| &c["params"]["newLocation"])
+        .collect();
+    assert_eq!(moves, [&json!("offDeck"), &json!({ "slotName": "2" }), &json!({ "slotName": "4" })]);
+}

@@ -169,12 +169,9 @@ class Reader:
                 module = self.modules[params["moduleId"]]
                 self.held(module, self.holds.pop(module, 0.0))
             case "thermocycler/openLid" | "thermocycler/closeLid":
-                # It is open at first; to open it while it is open does nothing.
-                module = self.modules[params["moduleId"]]
-                lid = kind.split("/")[1][:-3]
-                if self.lids.get(module, "open") != lid:
-                    self.say(kind, module)
-                self.lids[module] = lid
+                self.shut(self.modules[params["moduleId"]], kind, kind.split("/")[1][:-3])
+            case "heaterShaker/openLabwareLatch" | "heaterShaker/closeLabwareLatch":
+                self.shut(self.modules[params["moduleId"]], kind, kind.split("/")[1][: -len("LabwareLatch")])
             case "thermocycler/runProfile":
                 module = self.modules[params["moduleId"]]
                 for step in params["profile"]:
@@ -184,6 +181,12 @@ class Reader:
                 rest = {key: value for key, value in params.items() if key not in ("pipetteId", "moduleId", "labwareId")}
                 about = self.modules.get(params.get("moduleId"), mount)
                 self.say(kind, about, *frozen(rest))
+
+    def shut(self, module, kind, way):
+        """A lid or a latch is opened or closed. It is open at first; to open it while it is open does nothing."""
+        if self.lids.get(module, "open") != way:
+            self.say(kind, module)
+        self.lids[module] = way
 
     def block(self, module, celsius, params):
         """A set point of a thermocycler, with the volume that it allows for: its firmware has 25 uL where none is given."""

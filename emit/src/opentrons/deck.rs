@@ -27,6 +27,8 @@ pub(super) enum Location {
     Module(String),
     /// Other labware, such as an adapter, by its identifier.
     Labware(String),
+    /// Anywhere but on the deck.
+    Off,
 }
 
 /// Words of Python, and names that a protocol in Python has for itself.
@@ -118,6 +120,11 @@ impl<'p> Deck<'p> {
             None => {}
         }
         (self.scene.get(support).owner == Some(self.robot)).then(|| Location::Slot(label(name).to_owned()))
+    }
+
+    /// Where labware stands that is put on the deck, or taken off it.
+    pub(super) fn location_or_off(&self, name: &str) -> Location {
+        self.location(name).unwrap_or(Location::Off)
     }
 
     /// The identifier of the labware that a well or tip belongs to, and its name in it.

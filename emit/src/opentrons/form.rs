@@ -95,6 +95,7 @@ use Holds::{Definition, Flag, Location, Number, Text, Well};
 const FORMS: &[Form] = &[
     form("loadPipette", About::Pipette, &[("pipetteName", Text), ("mount", Text)], &[]),
     form("loadLabware", About::Labware, &[("definition", Definition), ("location", Location)], &[]),
+    form("moveLabware", About::Labware, &[("newLocation", Location), ("strategy", Text)], &[]),
     form("loadModule", About::Module, &[("model", Text), ("location", Location)], &[]),
     form("loadLiquid", About::Well, &[("volume", Number)], &[]),
     at("pickUpTip", &[("well", Well)], &[]),

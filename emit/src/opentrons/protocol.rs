@@ -13,7 +13,7 @@ use super::deck::Deck;
 use super::writer::Writer;
 use crate::Subject;
 use crate::finding::not_expressible;
-use crate::performance::{Deed, Performance, number};
+use crate::performance::{Act, Deed, Performance, Said, number};
 use crate::place;
 
 /// A command with its parameters as the command schema has them.
@@ -65,6 +65,7 @@ impl<'p> Protocol<'p> {
         let mut writer = Writer {
             deck: Deck::new(&subject.program.scene, robot.device),
             origins: place::origins(&subject.program.plan, subject.sources),
+            moved: moved(subject, performance),
             protocol: Protocol {
                 subject,
                 robot,
@@ -84,7 +85,10 @@ impl<'p> Protocol<'p> {
         for act in &performance.acts {
             let at = writer.origins.get(act.step.0 as usize).copied().unwrap_or_default();
             match &act.deed {
-                Deed::Operation(said) => writer.operation(act.step.0, said.as_deref(), at),
+                Deed::Operation(said) => {
+                    writer.operation(act.step.0, said.as_deref(), at);
+                    writer.join_pause();
+                }
                 Deed::Wait(seconds) => writer.push("waitForDuration", json!({ "seconds": number(*seconds) }), at),
                 Deed::Note(text) => writer.push("comment", json!({ "message": text }), at),
                 Deed::Ask(text) => writer.push("waitForResume", json!({ "message": text }), at),
@@ -93,6 +97,20 @@ impl<'p> Protocol<'p> {
         }
         writer.protocol
     }
+}
+
+/// Labware that is put in another place on the way.
+fn moved(subject: Subject<'_>, performance: &Performance<'_>) -> BTreeSet<InstanceId> {
+    let moves = |said: &Said| said.text.starts_with("moveLabware ");
+    let acts = performance.acts.iter().filter(|act| match &act.deed {
+        Deed::Operation(Some(said)) => said.iter().any(moves),
+        _ => false,
+    });
+    let device = |act: &Act| match &subject.program.plan.get(act.step).step {
+        Step::Operation(operation) => operation.device,
+        _ => None,
+    };
+    acts.filter_map(device).collect()
 }
 
 /// The robot whose devices are used, of those that have a driver.

@@ -116,6 +116,11 @@ impl Script {
         } else if protocol.commands.iter().any(is_aside) {
             self.text.push_str("from opentrons.types import Point\n\n");
         }
+        let is_off =
+            |c: &Command| ["location", "newLocation"].iter().any(|key| c.params.get(*key) == Some(&"offDeck".into()));
+        if protocol.loads.iter().chain(&protocol.commands).any(is_off) {
+            self.text.push_str("from opentrons import protocol_api\n\n");
+        }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
         let _ = writeln!(
             self.text,
@@ -155,7 +160,10 @@ impl Script {
                 let uri = format!("{}/{}/{version}", text("namespace"), text("loadName"));
                 let below = location["moduleId"].as_str().or_else(|| location["labwareId"].as_str());
                 let on = below.unwrap_or("protocol");
-                let slot = slot(&location).map(|s| format!(", {s}")).unwrap_or_default();
+                let slot = match location.as_str() {
+                    Some(_) => ", protocol_api.OFF_DECK".to_owned(),
+                    None => slot(&location).map(|s| format!(", {s}")).unwrap_or_default(),
+                };
                 let label = quoted(text("displayName"));
                 // An adapter takes no label.
                 let (kind, label) = match protocol.adapters.contains(&uri) {
@@ -237,6 +245,15 @@ impl Script {
                 };
                 let (speed, clear) = (given("speed", "speed"), given("minimumZHeight", "minimum_z_height"));
                 self.line(&format!("{pipette}.move_to({spot}{direct}{clear}{speed})"));
+            }
+            "moveLabware" => {
+                let to = command.params.get("newLocation").cloned().unwrap_or_default();
+                let place = match (to["slotName"].as_str(), to["moduleId"].as_str().or(to["labwareId"].as_str())) {
+                    (Some(slot), _) => quoted(slot),
+                    (None, Some(id)) => id.to_owned(),
+                    (None, None) => "protocol_api.OFF_DECK".to_owned(),
+                };
+                self.line(&format!("protocol.move_labware({}, {place})", text("labwareId")));
             }
             "setTipState" => self.line(&format!("{}.reset()", text("labwareId"))),
             "home" => match command.params.get("axes").and_then(Value::as_array) {

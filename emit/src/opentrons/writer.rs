@@ -1,5 +1,7 @@
 //! Steps as commands: each message of a driver with the identifiers of what it is about.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::script::Wired;
@@ -22,6 +24,8 @@ pub(super) struct Writer<'p, 'f> {
     pub(super) protocol: Protocol<'p>,
     pub(super) deck: Deck<'p>,
     pub(super) origins: Vec<Span>,
+    /// Labware that a person puts in another place.
+    pub(super) moved: BTreeSet<InstanceId>,
     pub(super) found: &'f mut Vec<Diagnostic>,
 }
 
@@ -30,6 +34,18 @@ impl Writer<'_, '_> {
     pub(super) fn push(&mut self, name: &'static str, params: Value, at: Span) {
         let Value::Object(params) = params else { return };
         self.protocol.commands.push(Command { name, params, at });
+    }
+
+    /// A person who is asked to move labware, as the robot itself asks: it waits for that by itself.
+    pub(super) fn join_pause(&mut self) {
+        let commands = &mut self.protocol.commands;
+        if let [.., pause, moved] = commands.as_mut_slice()
+            && (pause.name, moved.name) == ("waitForResume", "moveLabware")
+            && pause.at == moved.at
+        {
+            moved.params.insert("strategy".to_owned(), "manualMoveWithPause".into());
+            commands.remove(commands.len() - 2);
+        }
     }
 
     fn name(&self, id: InstanceId) -> &str {
@@ -47,7 +63,7 @@ impl Writer<'_, '_> {
             About::Robot => true,
             About::Pipette => belongs(self.protocol.subject, wired.device, robot),
             About::Labware | About::Module => match message.get("location") {
-                Some(location) => self.deck.location(location).is_some(),
+                Some(location) => self.deck.location(location).is_some() || self.moved.contains(&wired.device),
                 None => self.deck.get(wired.device).is_some(),
             },
             About::Well => self.deck.well(wired.device).is_some() && message.get("volume") != Some("0"),
@@ -162,15 +178,15 @@ impl Writer<'_, '_> {
                     let place = params.entry("coordinates").or_insert_with(|| json!({}));
                     place[*name] = (parsed(message, name, value)? + 0.0).into();
                 }
-                Holds::Location => drop(params.insert(
-                    key,
-                    match self.deck.location(value) {
-                        Some(Location::Slot(slot)) => json!({ "slotName": slot }),
-                        Some(Location::Module(id)) => json!({ "moduleId": id }),
-                        Some(Location::Labware(id)) => json!({ "labwareId": id }),
-                        None => Value::Null,
-                    },
-                )),
+                Holds::Location => {
+                    let location = match self.deck.location_or_off(value) {
+                        Location::Slot(slot) => json!({ "slotName": slot }),
+                        Location::Module(id) => json!({ "moduleId": id }),
+                        Location::Labware(id) => json!({ "labwareId": id }),
+                        Location::Off => json!("offDeck"),
+                    };
+                    params.insert(key, location);
+                }
                 Holds::Definition => self.definition(value, device, &mut params)?,
             }
         }

@@ -16,6 +16,10 @@ const OWN: &str = "opentrons";
 /// What definitions say of labware over whose wells the middle of all channels goes.
 const CENTRED: &str = "centerMultichannelOnWells";
 
+/// How analyses call what stands anywhere but on the deck, and what the language calls that place.
+pub(super) const OFF: &str = "offDeck";
+pub(super) const ASIDE: &str = "aside";
+
 /// How far apart channels are, mm.
 const PITCH: f64 = 9.0;
 
@@ -72,6 +76,8 @@ pub(super) struct Labware {
     pub(super) kind: Kind,
     /// What it stands on, as the language writes it.
     pub(super) on: String,
+    /// Where it comes as it is loaded, if it does not stand there from the start.
+    pub(super) comes: Option<String>,
     pub(super) wells: BTreeMap<String, Well>,
     /// Wells in the order of columns.
     pub(super) order: Vec<String>,
@@ -178,7 +184,11 @@ impl Deck {
             Value::Null => analysis.labware_definitions.get(&uri).unwrap_or(&Value::Null),
             found => found,
         };
-        let on = self.place_of(&command.params["location"])?;
+        let place = self.place_of(&command.params["location"])?;
+        // What comes to a place where something was before stands aside until then.
+        let is_taken = self.labware.values().any(|other| other.on == place && place != ASIDE);
+        let comes = is_taken.then(|| place.clone());
+        let on = if is_taken { ASIDE.to_owned() } else { place };
         let category = definition["metadata"]["displayCategory"].as_str().unwrap_or("wellPlate");
         let kind = if definition["parameters"]["isTiprack"] == true { Kind::Tips } else { Kind::Wells };
         let asset = match library.labware(&format!("{load_name}/{version}")) {
@@ -195,7 +205,7 @@ impl Deck {
         self.loaded.push(id.clone());
         let quirks = definition["parameters"]["quirks"].as_array();
         let is_centred = quirks.is_some_and(|quirks| quirks.iter().any(|quirk| quirk == CENTRED));
-        self.labware.insert(id, Labware { name, asset, kind, on, wells, order, is_centred });
+        self.labware.insert(id, Labware { name, asset, kind, on, comes, wells, order, is_centred });
         Ok(())
     }
 
@@ -217,7 +227,11 @@ impl Deck {
         name
     }
 
-    fn place_of(&self, location: &Value) -> Result<String, String> {
+    /// What stands in a place, as the language writes that.
+    pub(super) fn place_of(&self, location: &Value) -> Result<String, String> {
+        if location == OFF {
+            return Ok(ASIDE.to_owned());
+        }
         if let Some(slot) = slot(location) {
             return Ok(format!("ot2.slot[{slot}]"));
         }

@@ -38,7 +38,7 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
         return Err(Mistake { line: 0, why });
     }
     let library = Library::read();
-    let mut deck = Deck::new(&["ot2", "deck", "way", "well", "column"]);
+    let mut deck = Deck::new(&["ot2", deck::ASIDE, "deck", "way", "well", "column"]);
     let mut left_out = Vec::new();
     for (index, command) in analysis.commands.iter().enumerate() {
         if matches!(command.command_type.as_str(), "loadPipette" | "loadModule" | "loadLabware")
@@ -56,7 +56,9 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
     left_out.append(&mut steps.left_out);
     left_out.sort_by_key(|left| left.line);
     let nodes = std::mem::take(&mut steps.nodes);
-    let page = Page { deck: &deck, flows: &flows, holding: &holding, parked: &parked(&analysis) };
+    let leaves = |c: &Command| c.command_type == "moveLabware" && c.params["newLocation"] == deck::OFF;
+    let has_aside = deck.labware.values().any(|l| l.on == deck::ASIDE) || analysis.commands.iter().any(leaves);
+    let page = Page { deck: &deck, flows: &flows, holding: &holding, parked: &parked(&analysis), has_aside };
     let text = page.text(&analysis, title, &folded(nodes));
     let text = format(FileId(0), &text).map_err(|found| {
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
@@ -107,7 +109,8 @@ fn steps<'a>(
     let mut steps = Steps::new(analysis, deck, flows, liquids);
     let parked = parked(analysis);
     steps.park(&parked, tips::refills(&analysis.commands, deck, &parked));
-    let is_step = |c: &Command| !c.command_type.starts_with("load");
+    // Labware may come to a place that something has left.
+    let is_step = |c: &Command| !c.command_type.starts_with("load") || c.command_type == "loadLabware";
     // The robot begins at home by itself.
     let first = analysis.commands.iter().position(|c| c.command_type != "home").unwrap_or(0);
     for (index, command) in analysis.commands.iter().enumerate().skip(first).filter(|(_, c)| is_step(c)) {
@@ -134,6 +137,8 @@ struct Page<'p> {
     holding: &'p Holding,
     /// Racks that begin without tips: others are parked there.
     parked: &'p BTreeSet<String>,
+    /// Whether something stands beside the robot at some time.
+    has_aside: bool,
 }
 
 impl Page<'_> {
@@ -143,6 +148,9 @@ impl Page<'_> {
         let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
         let _ = writeln!(out, "//! {name}. Imported from {title}.\n");
         let used: BTreeSet<&str> = self.deck.used.iter().map(String::as_str).chain(["OT2", "TrashBin"]).collect();
+        if self.has_aside {
+            out.push_str("use std::furniture::LabBench\n");
+        }
         let _ = writeln!(out, "use std::opentrons::{{{}}}\n", used.into_iter().collect::<Vec<_>>().join(", "));
         for (asset, from) in &self.deck.assets {
             let _ = writeln!(out, "asset {asset} from labware \"{from}\"");
@@ -192,6 +200,9 @@ impl Page<'_> {
             })
             .collect();
         let _ = writeln!(out, "ot2 = OT2{} at (0, 0, 0) m", words::braced(&mounts));
+        if self.has_aside {
+            let _ = writeln!(out, "{} = LabBench at (0, -1.5, 0) m", deck::ASIDE);
+        }
         for id in &self.deck.loaded {
             if let Some(module) = self.deck.modules.get(id) {
                 let _ = writeln!(out, "{} = {} on ot2.slot[{}]", module.name, module.asset, module.slot);

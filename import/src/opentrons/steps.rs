@@ -156,6 +156,8 @@ impl<'a> Steps<'a> {
             "home" => self.home(command),
             "setRailLights" => self.say(if command.params["on"] == true { "light ot2" } else { "dim ot2" }),
             "setTipState" => self.refill(command),
+            "moveLabware" => self.relocate(command),
+            "loadLabware" => self.brought(command),
             name => self.module(name, command),
         }
     }
@@ -456,6 +458,25 @@ impl<'a> Steps<'a> {
         }
         self.refilled(id);
         Ok(())
+    }
+
+    /// A person puts labware in another place.
+    fn relocate(&mut self, command: &Command) -> Result<(), String> {
+        let labware = self.deck.labware.get(command.text("labwareId")).ok_or("its labware is not imported")?;
+        let place = self.deck.place_of(&command.params["newLocation"])?;
+        let verb = match command.text("strategy") {
+            "manualMoveWithPause" => "relocate",
+            "manualMoveWithoutPause" => "moved",
+            other => return Err(format!("`{other}` is not supported")),
+        };
+        self.say(format!("{verb} {} to {place}", labware.name))
+    }
+
+    /// Labware that comes to a place where something was before.
+    fn brought(&mut self, command: &Command) -> Result<(), String> {
+        let labware = command.loaded("labwareId").and_then(|id| self.deck.labware.get(id));
+        let Some((labware, place)) = labware.and_then(|l| Some((l, l.comes.clone()?))) else { return Ok(()) };
+        self.say(format!("moved {} to {place}", labware.name))
     }
 
     fn module(&mut self, command_type: &str, command: &Command) -> Result<(), String> {

@@ -88,7 +88,9 @@ fn serve(
         let same = |e: &Value| e["method"] == method.as_str() && e["path"] == path.as_str() && e["body"] == body;
         *stopped |= body["data"]["actionType"] == "stop";
         let (status, answer) = match (expected, spoiled) {
-            _ if looks(&method, &path) => (200, json!({ "data": { "status": if *stopped { "stopped" } else { "running" } } })),
+            _ if looks(&method, &path) => {
+                (200, json!({ "data": { "status": if *stopped { "stopped" } else { "running" } } }))
+            }
             _ if version != "4" => (422, json!({ "errors": [{ "id": "InvalidRequest", "detail": "no version" }] })),
             (Some(e), Some((at, how))) if same(e) && *at == name => match how {
                 Spoiled::Cut => return,

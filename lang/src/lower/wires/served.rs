@@ -89,7 +89,11 @@ impl<'a> Planner<'a, '_> {
             let name = p.name.text.clone();
             let (values, local): (Vec<Value>, Option<u32>) = match ty {
                 _ if name == own => (vec![Value::Instance(instance)], None),
-                Some(ty) if is_option && said.contains(name.as_str()) && !matches!(ty, Type::Instance { .. } | Type::List(_)) => {
+                Some(ty)
+                    if is_option
+                        && said.contains(name.as_str())
+                        && !matches!(ty, Type::Instance { .. } | Type::List(_)) =>
+                {
                     self.open_value(&ty, &name)
                 }
                 // What the command takes where nothing is said, as the line says nothing of it.
