@@ -868,3 +868,47 @@ fn labware_that_is_moved_or_brought_is_imported() {
         .collect();
     assert_eq!(moves, [&json!("offDeck"), &json!({ "slotName": "2" }), &json!({ "slotName": "4" })]);
 }
+
+#[test]
+fn tips_come_from_the_next_rack_where_one_is_empty() {
+    let bench = |racks: &str, uses: &str| {
+        let dir = folder("protocols_racks");
+        let text = format!(
+            r#"mtx 1
+use std::opentrons::{{Corning96, OT2, P300Multi, P300Single, Reservoir12, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Single, right: P300Multi }} at (0, 0, 0) m
+{racks}
+    stock = Reservoir12 on ot2.slot[3] holding {{ A1: 5 mL of water }}
+    plate = Corning96 on ot2.slot[6]
+}}
+workflow w in deck {{
+{uses}
+}}
+"#
+        );
+        write(&dir, "lab.mtx", text);
+        let checked = matterixc_in(&dir, &["check", "--strict", "lab.mtx"]);
+        let python = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python"]).out;
+        let taken = python.lines().filter_map(|l| l.trim().split_once(".pick_up_tip(").map(|(_, tip)| tip.to_owned()));
+        (checked, taken.collect::<Vec<_>>())
+    };
+    let racks = "    one = TipRack300 { emptied: 94 } on ot2.slot[5]\n    two = TipRack300 on ot2.slot[4]";
+    let each = "    transfer 50 uL from stock[A1] to plate[A1 .. D1] by ot2.left using [one, two] { tips: each }";
+    let (checked, taken) = bench(racks, each);
+    assert_eq!(checked.code, 0, "{}", checked.out);
+    assert_eq!(taken, ["one[\"G12\"])", "one[\"H12\"])", "two[\"A1\"])", "two[\"B1\"])"]);
+    // An incomplete column does not serve eight channels.
+    let columns = "    transfer 50 uL from stock[A1] to plate[A1 .. H2] by ot2.right using [one, two] { tips: each }";
+    let (checked, taken) = bench(racks, columns);
+    assert_eq!(checked.code, 0, "{}", checked.out);
+    assert_eq!(taken, ["two[\"A1\"])", "two[\"A2\"])"]);
+    let (checked, _) = bench(&racks.replace("two = TipRack300", "two = TipRack300 { emptied: 95 }"), each);
+    assert!(checked.code == 1 && checked.out.contains("error[out-of-tips]"), "{}", checked.out);
+    let (checked, taken) = bench(
+        racks,
+        "    distribute 20 uL from stock[A1] to plate[A1 .. D1] by ot2.left using [two, one] { tips: once }",
+    );
+    assert_eq!((checked.code, taken.len()), (0, 1), "{}", checked.out);
+}

@@ -185,7 +185,7 @@ def played(text):
 def plays(file):
     """A protocol that the robot runs by itself, on a robot with its pipettes: each of its commands has succeeded."""
     source = pathlib.Path(file)
-    text = re.sub(r"\bwait [\d.]+ (s|min|h)\b", "wait 1 s", source.read_text())
+    text = re.sub(r"^( *)wait (?!until).*$", r"\1wait 1 s", source.read_text(), flags=re.M)
     text = re.sub(r'\bask "', 'note "', text)
     # This version knows no lights in JSON.
     text = re.sub(r"^ *(dim|light) .*\n", "", text, flags=re.M)
