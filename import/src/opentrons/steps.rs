@@ -46,6 +46,10 @@ pub(super) struct Steps<'a> {
     tips: BTreeMap<String, usize>,
     /// What modules were set to last, degC.
     targets: BTreeMap<String, f64>,
+    /// Numbers of the commands that set modules which stay on at the end.
+    staying: BTreeSet<usize>,
+    /// The number of the command on its way.
+    at: usize,
     /// How long modules hold their temperature once they are there, s, until that is waited for.
     holds: BTreeMap<String, f64>,
     /// Modules that shake.
@@ -90,6 +94,8 @@ impl<'a> Steps<'a> {
             refills: Refills::new(),
             tips: BTreeMap::new(),
             targets: BTreeMap::new(),
+            staying: staying(&analysis.commands),
+            at: 0,
             holds: BTreeMap::new(),
             shaking: BTreeSet::new(),
             flows,
@@ -98,6 +104,7 @@ impl<'a> Steps<'a> {
 
     /// Takes the next command; `index` counts from 1.
     pub(super) fn take(&mut self, index: usize, command: &Command) {
+        self.at = index;
         let done = self.step(command);
         if let Some(racks) = self.refills.remove(&(index - 1)) {
             racks.iter().for_each(|id| self.refilled(id));
@@ -544,7 +551,8 @@ impl<'a> Steps<'a> {
     fn heat(&mut self, module: &str, celsius: f64, volume: Option<f64>) -> Result<(), String> {
         self.targets.insert(module.to_owned(), celsius);
         let volume = volume.filter(|volume| *volume > 0.0).map(|volume| format!("volume: {} uL", number(volume)));
-        let options = words::braced(&volume.into_iter().collect::<Vec<_>>());
+        let stays = self.staying.contains(&self.at).then(|| "stays: true".to_owned());
+        let options = words::braced(&volume.into_iter().chain(stays).collect::<Vec<_>>());
         self.say(format!("heat {module} to {} degC{options}", number(celsius)))
     }
 
@@ -642,4 +650,19 @@ mod tests {
             ["2 min", "90 s", "2 h", "0.5 s"]
         );
     }
+}
+
+/// Numbers of the commands after which a module stays at its temperature to the end.
+fn staying(commands: &[Command]) -> BTreeSet<usize> {
+    let mut last: BTreeMap<&str, usize> = BTreeMap::new();
+    for (index, command) in commands.iter().enumerate() {
+        let verb = command.command_type.split_once('/').map_or("", |(_, verb)| verb);
+        let module = command.text("moduleId");
+        match verb {
+            "setTargetTemperature" | "setTargetBlockTemperature" => drop(last.insert(module, index + 1)),
+            "deactivate" | "deactivateHeater" | "deactivateBlock" | "runProfile" => drop(last.remove(module)),
+            _ => {}
+        }
+    }
+    last.into_values().collect()
 }
