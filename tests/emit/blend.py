@@ -10,6 +10,7 @@ def run(protocol):
     tips = protocol.load_labware("opentrons_96_tiprack_300ul", "8", label="tips", namespace="opentrons", version=1)
     small = protocol.load_labware("opentrons_96_tiprack_20ul", "9", label="small", namespace="opentrons", version=1)
     shaker = protocol.load_module("heaterShakerModuleV1", "1")
+    shaker.open_labware_latch()
     plate = shaker.load_labware("corning_96_wellplate_360ul_flat", label="plate", namespace="opentrons", version=2)
     stock = protocol.load_labware("nest_12_reservoir_15ml", "5", label="stock", namespace="opentrons", version=1)
     stock["A1"].load_liquid(liquid_1, 10000)
