@@ -212,6 +212,9 @@ pub struct RunArgs {
     /// Plan all motions again instead of using the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
+    /// The file that keeps how far tip racks are used up: read before, and written after. A new one begins with full racks.
+    #[arg(long, value_name = "FILE")]
+    pub tips: Option<PathBuf>,
     /// The format of the report.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,
@@ -596,6 +599,9 @@ pub struct EmitArgs {
     /// Send it to the device in these bindings, and wait until the device has run it.
     #[arg(long, value_name = "BINDINGS", conflicts_with = "out")]
     pub play: Option<PathBuf>,
+    /// The file that keeps how far tip racks are used up: read before, and written after. A new one begins with full racks.
+    #[arg(long, value_name = "FILE")]
+    pub tips: Option<PathBuf>,
     /// The seed of the written run.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,

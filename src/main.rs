@@ -23,6 +23,7 @@ mod reads;
 mod record;
 mod report;
 mod terminal;
+mod tips;
 mod uri;
 
 use std::process::ExitCode;

@@ -5,11 +5,11 @@ use std::sync::atomic::Ordering;
 use matterix_ir::Diagnostic;
 
 use crate::args::{Color, EmitArgs};
-use crate::pipeline::{self, Input};
+use crate::pipeline::{self, Input, Options};
 use crate::terminal::{self, print_error};
 
 use super::bill::show;
-use crate::{Exit, cache, cancel, files};
+use crate::{Exit, cache, cancel, files, tips};
 
 /// Compiles, performs once on the digital twin and writes what was done; findings go to standard error. Nothing is written
 /// where there is an error.
@@ -19,20 +19,22 @@ pub fn emit(args: &EmitArgs, color: Color) -> Exit {
 
 fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
-    let (sources, wired, mut found) = pipeline::wire(&input, &args.subject.options(), args.target.wire());
+    let kept = args.tips.as_deref().map(tips::read).transpose()?.unwrap_or_default();
+    let options = Options { measured: kept.clone(), ..args.subject.options() };
+    let (sources, wired, mut found) = pipeline::wire(&input, &options, args.target.wire());
     let is_wrong = |found: &[Diagnostic]| found.iter().any(Diagnostic::is_error);
     let cancel = cancel::on_interrupt()?;
     let mut written = None;
     if let Some((program, wiring)) = wired.filter(|_| !is_wrong(&found)) {
         found.extend(pipeline::motions(&program, &*cache::of(args.no_cache)));
         if !is_wrong(&found) {
-            let (bytes, more) = pipeline::emit(&program, &wiring, &sources, args.target, args.seed, cancel);
+            let (emitted, more) = pipeline::emit(&program, &wiring, &sources, args.target, args.seed, cancel);
             found.extend(more);
-            written = bytes;
+            written = emitted.map(|emitted| (emitted, program));
         }
     }
     show(&sources, found, color);
-    let Some(bytes) = written else {
+    let Some((pipeline::Emitted { bytes, states }, program)) = written else {
         if cancel.load(Ordering::SeqCst) {
             print_error("stopped before the end of the workflow; nothing is written");
         }
@@ -44,11 +46,19 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
             pipeline::Target::Urscript => "program.script",
             _ => "protocol.json",
         };
-        return super::play::play(&input, &args.subject.options(), bindings, (name, bytes), cancel, color);
+        // Whatever became of it, the robot may have taken these tips.
+        let played = super::play::play(&input, &options, bindings, (name, bytes), cancel, color)?;
+        if let Some(path) = &args.tips {
+            tips::write(path, &kept, &program, &states)?;
+        }
+        return Ok(played);
     }
     match &args.out {
         Some(path) => files::write(path, bytes)?,
         None => terminal::pour(&bytes),
+    }
+    if let Some(path) = &args.tips {
+        tips::write(path, &kept, &program, &states)?;
     }
     Ok(Exit::Fine)
 }

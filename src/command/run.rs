@@ -10,11 +10,11 @@ use matterix_runtime::record::Folder;
 
 use crate::args::{Color, RunArgs, RunFormat};
 use crate::cache;
-use crate::pipeline::{self, Choices, Input, Keep, Search};
+use crate::pipeline::{self, Choices, Input, Keep, Options, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
 use crate::terminal::{self, Stream, paint, print};
-use crate::{Exit, cancel, files};
+use crate::{Exit, cancel, files, tips};
 
 /// Compiles, executes and reports; findings and progress go to standard error, the report to standard output.
 pub fn run(args: &RunArgs, color: Color) -> Exit {
@@ -30,7 +30,9 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         is_writable(dir)?;
     }
     let mut findings = Findings::new(args.format, color);
-    let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
+    let kept = args.tips.as_deref().map(tips::read).transpose()?.unwrap_or_default();
+    let options = Options { measured: kept.clone(), ..args.subject.options() };
+    let (sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
     let Some(mut program) = program.filter(|_| !is_wrong) else {
@@ -71,6 +73,9 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     }
     if let Some(dir) = &args.out {
         ran.write(dir, args.csv)?;
+    }
+    if let Some(path) = args.tips.as_deref().filter(|_| ran.passed) {
+        tips::write(path, &kept, &program, &ran.states)?;
     }
     Ok(if ran.passed { Exit::Fine } else { Exit::Findings })
 }

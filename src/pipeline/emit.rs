@@ -47,7 +47,15 @@ impl Target {
     }
 }
 
-/// The bytes of the file, none where something keeps it from being written, and what was found.
+/// A file for another program.
+pub struct Emitted {
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// States at the end of what was performed, by index, SI.
+    pub states: Vec<Option<f64>>,
+}
+
+/// The file, none where something keeps it from being written, and what was found.
 pub fn emit(
     program: &Program,
     wiring: &Wiring,
@@ -55,7 +63,7 @@ pub fn emit(
     target: Target,
     seed: u64,
     cancel: &AtomicBool,
-) -> (Option<Vec<u8>>, Vec<Diagnostic>) {
+) -> (Option<Emitted>, Vec<Diagnostic>) {
     let limits = Limits { cancel: Some(cancel), ..Limits::default() };
     let options = RunOptions { seed, fidelity: target.fidelity(), limits, ..RunOptions::default() };
     let subject = Subject { program, wiring, sources };
@@ -80,7 +88,7 @@ pub fn emit(
     match written {
         Ok((bytes, warnings)) => {
             found.extend(warnings);
-            (Some(bytes), found)
+            (Some(Emitted { bytes, states: outcome.states }), found)
         }
         Err(errors) => {
             found.extend(errors);

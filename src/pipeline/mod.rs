@@ -31,7 +31,7 @@ use matterix_runtime::motion::{Store, overlaps, preflight};
 
 pub use bill::{Prices, bill};
 pub use deploy::{Plan as DeployPlan, deploy};
-pub use emit::{Target, emit};
+pub use emit::{Emitted, Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Calibration, Gauged, Options, Test, Wires};

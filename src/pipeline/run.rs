@@ -115,7 +115,8 @@ pub fn run<'a>(
     };
     let report = Report::new(&Run { program: &program, recording: &recording, sources, info: &info });
     let passed = outcome.status == RunStatus::Passed;
-    Ran { program, sources, recording, info, report, diagnostics: findings(&outcome, sources), passed }
+    let diagnostics = findings(&outcome, sources);
+    Ran { program, sources, recording, info, report, diagnostics, passed, states: outcome.states }
 }
 
 /// A finished run.
@@ -130,6 +131,8 @@ pub struct Ran<'a> {
     pub diagnostics: Vec<Diagnostic>,
     /// Whether it came to its end and every expectation held.
     pub passed: bool,
+    /// States at the end, by index, SI.
+    pub states: Vec<Option<f64>>,
 }
 
 impl Ran<'_> {

@@ -912,3 +912,50 @@ workflow w in deck {{
     );
     assert_eq!((checked.code, taken.len()), (0, 1), "{}", checked.out);
 }
+
+#[test]
+fn tips_are_continued_from_a_file() {
+    let dir = folder("protocols_tips");
+    let text = r#"mtx 1
+use std::opentrons::{Corning96, OT2, P300Single, Reservoir12, TipRack300}
+lab deck {
+    ambient: 22 degC
+    ot2 = OT2 { left: P300Single } at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[5]
+    more = TipRack300 on ot2.slot[4]
+    stock = Reservoir12 on ot2.slot[3] holding { A1: 5 mL of water }
+    plate = Corning96 on ot2.slot[6]
+}
+workflow w in deck {
+    transfer 50 uL from stock[A1] to plate[A1 .. H5] by ot2.left using [tips, more] { tips: each }
+}
+"#;
+    write(&dir, "lab.mtx", text);
+    let kept = || std::fs::read_to_string(dir.join("tips.csv")).expect("a table");
+    let emit = || matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python", "--tips", "tips.csv"]);
+    let ended = emit();
+    assert!(ended.code == 0 && ended.out.contains("pick_up_tip(tips[\"A1\"])"), "{}{}", ended.out, ended.err);
+    assert_eq!(kept(), "rack,taken\nmore,0\ntips,40\n");
+    assert!(emit().out.contains("pick_up_tip(tips[\"A6\"])"));
+    let ended = matterixc_in(&dir, &["run", "lab.mtx", "--tips", "tips.csv"]);
+    assert_eq!((ended.code, kept().as_str()), (0, "rack,taken\nmore,24\ntips,96\n"), "{}", ended.err);
+    // Where not enough are left nothing is written.
+    emit();
+    let before = kept();
+    let ended = emit();
+    assert!(ended.code == 1 && ended.err.contains("error[out-of-tips]"), "{}", ended.err);
+    assert_eq!(kept(), before);
+    // Tips before one that was taken by name count as taken.
+    std::fs::remove_file(dir.join("tips.csv")).expect("a table");
+    write(&dir, "lab.mtx", text.replace("    transfer", "    pick up tip more[C2] by ot2.left\n    drop tip by ot2.left\n    transfer"));
+    emit();
+    assert_eq!(kept(), "rack,taken\nmore,11\ntips,40\n");
+    for (table, said) in [("tips,40\n", "first line must be `rack,taken`"), ("rack,taken\ntips,many\n", "line 2: `many`")] {
+        write(&dir, "tips.csv", table);
+        let ended = emit();
+        assert!(ended.code == 2 && ended.err.contains(said), "{}", ended.err);
+    }
+    write(&dir, "tips.csv", "rack,taken\nother,4\n");
+    let ended = emit();
+    assert!(ended.code == 1 && ended.err.contains("no lab of this file declares `other` itself"), "{}", ended.err);
+}
