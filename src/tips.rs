@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use matterix_ir::Program;
+use matterix_ir::scene::Instance;
 
 use crate::files;
 use crate::pipeline::{Calibration, Gauged};
@@ -49,17 +50,26 @@ pub fn read(path: &Path) -> Result<Calibration, String> {
     Ok(Calibration { name: path.display().to_string(), text, given })
 }
 
-/// Writes how far the racks of a lab are used up, by the states at the end of a run; racks of other labs that the file has stay in it.
-pub fn write(path: &Path, before: &Calibration, program: &Program, states: &[Option<f64>]) -> Result<(), String> {
-    let number = |gauged: &Gauged| before.text[gauged.value.clone()].trim().to_owned();
-    let mut table: BTreeMap<String, String> =
-        before.given.iter().map(|gauged| (gauged.thing.0.clone(), number(gauged))).collect();
-    for (rack, taken) in taken(program, states) {
-        table.insert(rack, taken.to_string());
+/// Whether a lab names each of its racks by itself, as the file does; `Err` says which it does not.
+pub fn agrees(program: &Program) -> Result<(), String> {
+    match racks(program).find(|(_, rack)| rack.name.contains(['[', '.'])) {
+        Some((_, rack)) => {
+            Err(format!("`--tips` needs racks that the lab declares one by one; `{}` is one of several", rack.name))
+        }
+        None => Ok(()),
     }
-    let lines = table.into_iter().map(|(rack, taken)| format!("{rack},{taken}\n"));
+}
+
+/// Writes how far the racks of a lab are used up, by the states at the end of a run.
+pub fn write(path: &Path, program: &Program, states: &[Option<f64>]) -> Result<(), String> {
+    let lines = taken(program, states).into_iter().map(|(rack, taken)| format!("{rack},{taken}\n"));
     let text = std::iter::once(format!("{}\n", HEAD.join(","))).chain(lines).collect::<String>();
     files::write(path, text.into_bytes())
+}
+
+/// The racks of a lab, by the number of their instance.
+fn racks(program: &Program) -> impl Iterator<Item = (usize, &Instance)> {
+    program.scene.instances.iter().enumerate().filter(|(_, i)| i.capabilities.iter().any(|c| c == RACK))
 }
 
 /// The last tip that was taken of each rack, from 1; 0 where none was.
@@ -67,11 +77,10 @@ fn taken(program: &Program, states: &[Option<f64>]) -> Vec<(String, usize)> {
     let names = program.model.states.iter().enumerate().map(|(index, state)| (state.name.as_str(), index));
     let index: BTreeMap<&str, usize> = names.collect();
     let value = |name: &str| index.get(name).and_then(|at| states.get(*at).copied().flatten()).unwrap_or(0.0);
-    let racks = program.scene.instances.iter().enumerate().filter(|(_, i)| i.capabilities.iter().any(|c| c == RACK));
-    racks
+    racks(program)
         .map(|(id, rack)| {
-            let of_rack = |owner: Option<matterix_ir::scene::InstanceId>| owner.is_some_and(|o| o.0 as usize == id);
-            let tips = program.scene.instances.iter().filter(|tip| of_rack(tip.owner)).enumerate();
+            let of_rack = |tip: &&Instance| tip.owner.is_some_and(|owner| owner.0 as usize == id);
+            let tips = program.scene.instances.iter().filter(of_rack).enumerate();
             let picked = tips.filter(|(_, tip)| value(&format!("{}.{PICKED}", tip.name)) != 0.0).map(|(at, _)| at + 1);
             let emptied = value(&format!("{}.{EMPTIED}", rack.name)) as usize;
             (rack.name.clone(), picked.max().unwrap_or(0).max(emptied))

@@ -20,12 +20,15 @@ pub fn emit(args: &EmitArgs, color: Color) -> Exit {
 fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let kept = args.tips.as_deref().map(tips::read).transpose()?.unwrap_or_default();
-    let options = Options { measured: kept.clone(), ..args.subject.options() };
+    let options = Options { measured: kept, ..args.subject.options() };
     let (sources, wired, mut found) = pipeline::wire(&input, &options, args.target.wire());
     let is_wrong = |found: &[Diagnostic]| found.iter().any(Diagnostic::is_error);
     let cancel = cancel::on_interrupt()?;
     let mut written = None;
     if let Some((program, wiring)) = wired.filter(|_| !is_wrong(&found)) {
+        if args.tips.is_some() {
+            tips::agrees(&program)?;
+        }
         found.extend(pipeline::motions(&program, &*cache::of(args.no_cache)));
         if !is_wrong(&found) {
             let (emitted, more) = pipeline::emit(&program, &wiring, &sources, args.target, args.seed, cancel);
@@ -49,7 +52,7 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
         // Whatever became of it, the robot may have taken these tips.
         let played = super::play::play(&input, &options, bindings, (name, bytes), cancel, color)?;
         if let Some(path) = &args.tips {
-            tips::write(path, &kept, &program, &states)?;
+            tips::write(path, &program, &states)?;
         }
         return Ok(played);
     }
@@ -58,7 +61,7 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
         None => terminal::pour(&bytes),
     }
     if let Some(path) = &args.tips {
-        tips::write(path, &kept, &program, &states)?;
+        tips::write(path, &program, &states)?;
     }
     Ok(Exit::Fine)
 }

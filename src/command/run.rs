@@ -31,7 +31,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     }
     let mut findings = Findings::new(args.format, color);
     let kept = args.tips.as_deref().map(tips::read).transpose()?.unwrap_or_default();
-    let options = Options { measured: kept.clone(), ..args.subject.options() };
+    let options = Options { measured: kept, ..args.subject.options() };
     let (sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
@@ -39,6 +39,9 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         findings.end();
         return Ok(Exit::Findings);
     };
+    if args.tips.is_some() {
+        tips::agrees(&program)?;
+    }
     let drawn = reality.draw(&mut program, args.seed)?;
     let found = match reality.moves() && !args.dry {
         true => pipeline::motions(&program, &*cache::of(args.no_cache)),
@@ -75,7 +78,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         ran.write(dir, args.csv)?;
     }
     if let Some(path) = args.tips.as_deref().filter(|_| ran.passed) {
-        tips::write(path, &kept, &program, &ran.states)?;
+        tips::write(path, &program, &ran.states)?;
     }
     Ok(if ran.passed { Exit::Fine } else { Exit::Findings })
 }

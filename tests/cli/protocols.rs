@@ -947,10 +947,16 @@ workflow w in deck {
     assert_eq!(kept(), before);
     // Tips before one that was taken by name count as taken.
     std::fs::remove_file(dir.join("tips.csv")).expect("a table");
-    write(&dir, "lab.mtx", text.replace("    transfer", "    pick up tip more[C2] by ot2.left\n    drop tip by ot2.left\n    transfer"));
+    write(
+        &dir,
+        "lab.mtx",
+        text.replace("    transfer", "    pick up tip more[C2] by ot2.left\n    drop tip by ot2.left\n    transfer"),
+    );
     emit();
     assert_eq!(kept(), "rack,taken\nmore,11\ntips,40\n");
-    for (table, said) in [("tips,40\n", "first line must be `rack,taken`"), ("rack,taken\ntips,many\n", "line 2: `many`")] {
+    for (table, said) in
+        [("tips,40\n", "first line must be `rack,taken`"), ("rack,taken\ntips,many\n", "line 2: `many`")]
+    {
         write(&dir, "tips.csv", table);
         let ended = emit();
         assert!(ended.code == 2 && ended.err.contains(said), "{}", ended.err);
