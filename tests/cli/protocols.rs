@@ -935,10 +935,10 @@ workflow w in deck {
     let emit = || matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-python", "--tips", "tips.csv"]);
     let ended = emit();
     assert!(ended.code == 0 && ended.out.contains("pick_up_tip(tips[\"A1\"])"), "{}{}", ended.out, ended.err);
-    assert_eq!(kept(), "rack,taken\nmore,0\ntips,40\n");
+    assert_eq!(kept(), "rack,taken\ntips,40\nmore,0\n");
     assert!(emit().out.contains("pick_up_tip(tips[\"A6\"])"));
     let ended = matterixc_in(&dir, &["run", "lab.mtx", "--tips", "tips.csv"]);
-    assert_eq!((ended.code, kept().as_str()), (0, "rack,taken\nmore,24\ntips,96\n"), "{}", ended.err);
+    assert_eq!((ended.code, kept().as_str()), (0, "rack,taken\ntips,96\nmore,24\n"), "{}", ended.err);
     // Where not enough are left nothing is written.
     emit();
     let before = kept();
@@ -953,7 +953,7 @@ workflow w in deck {
         text.replace("    transfer", "    pick up tip more[C2] by ot2.left\n    drop tip by ot2.left\n    transfer"),
     );
     emit();
-    assert_eq!(kept(), "rack,taken\nmore,11\ntips,40\n");
+    assert_eq!(kept(), "rack,taken\ntips,40\nmore,11\n");
     for (table, said) in
         [("tips,40\n", "first line must be `rack,taken`"), ("rack,taken\ntips,many\n", "line 2: `many`")]
     {

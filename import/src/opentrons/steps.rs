@@ -629,6 +629,21 @@ fn duration(seconds: f64) -> String {
     }
 }
 
+/// Numbers of the commands after which a module stays at its temperature to the end.
+fn staying(commands: &[Command]) -> BTreeSet<usize> {
+    let mut last: BTreeMap<&str, usize> = BTreeMap::new();
+    for (index, command) in commands.iter().enumerate() {
+        let verb = command.command_type.split_once('/').map_or("", |(_, verb)| verb);
+        let module = command.text("moduleId");
+        match verb {
+            "setTargetTemperature" | "setTargetBlockTemperature" => drop(last.insert(module, index + 1)),
+            "deactivate" | "deactivateHeater" | "deactivateBlock" | "runProfile" => drop(last.remove(module)),
+            _ => {}
+        }
+    }
+    last.into_values().collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -650,19 +665,4 @@ mod tests {
             ["2 min", "90 s", "2 h", "0.5 s"]
         );
     }
-}
-
-/// Numbers of the commands after which a module stays at its temperature to the end.
-fn staying(commands: &[Command]) -> BTreeSet<usize> {
-    let mut last: BTreeMap<&str, usize> = BTreeMap::new();
-    for (index, command) in commands.iter().enumerate() {
-        let verb = command.command_type.split_once('/').map_or("", |(_, verb)| verb);
-        let module = command.text("moduleId");
-        match verb {
-            "setTargetTemperature" | "setTargetBlockTemperature" => drop(last.insert(module, index + 1)),
-            "deactivate" | "deactivateHeater" | "deactivateBlock" | "runProfile" => drop(last.remove(module)),
-            _ => {}
-        }
-    }
-    last.into_values().collect()
 }
