@@ -859,14 +859,18 @@ fn labware_that_is_moved_or_brought_is_imported() {
     ] {
         assert!(text.contains(line), "{line}: {text}");
     }
-    let moves: Vec<&Value> = protocol["commands"]
-        .as_array()
-        .expect("commands")
-        .iter()
-        .filter(|c| c["commandType"] == "moveLabware")
-        .map(|c| &c["params"]["newLocation"])
+    let commands = protocol["commands"].as_array().expect("commands").iter();
+    let places: Vec<(&str, &Value)> = commands
+        .filter_map(|c| {
+            let name = c["commandType"].as_str()?;
+            let place = &c["params"][if name == "moveLabware" { "newLocation" } else { "location" }];
+            (name == "moveLabware" || c["params"]["labwareId"] == "second").then_some((name, place))
+        })
+        .filter(|(_, place)| !place.is_null())
         .collect();
-    assert_eq!(moves, [&json!("offDeck"), &json!({ "slotName": "2" }), &json!({ "slotName": "4" })]);
+    let [second, fourth] = ["2", "4"].map(|slot| json!({ "slotName": slot }));
+    let off = json!("offDeck");
+    assert_eq!(places, [("moveLabware", &off), ("loadLabware", &second), ("moveLabware", &fourth)]);
 }
 
 #[test]

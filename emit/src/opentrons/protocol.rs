@@ -1,6 +1,6 @@
 //! A performance as commands of the run engine.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::WHAT;
 use super::deck::Deck;
-use super::writer::Writer;
+use super::writer::{MOVES, Writer};
 use crate::Subject;
 use crate::finding::not_expressible;
 use crate::performance::{Act, Deed, Performance, Said, number};
@@ -62,10 +62,12 @@ impl<'p> Protocol<'p> {
         robot: &'p Wired,
         found: &mut Vec<Diagnostic>,
     ) -> Self {
+        let origins = place::origins(&subject.program.plan, subject.sources);
         let mut writer = Writer {
             deck: Deck::new(&subject.program.scene, robot.device),
-            origins: place::origins(&subject.program.plan, subject.sources),
-            moved: moved(subject, performance),
+            moved: moved(subject, performance, &origins),
+            later: BTreeMap::new(),
+            origins,
             protocol: Protocol {
                 subject,
                 robot,
@@ -99,18 +101,23 @@ impl<'p> Protocol<'p> {
     }
 }
 
-/// Labware that is put in another place on the way.
-fn moved(subject: Subject<'_>, performance: &Performance<'_>) -> BTreeSet<InstanceId> {
-    let moves = |said: &Said| said.text.starts_with("moveLabware ");
-    let acts = performance.acts.iter().filter(|act| match &act.deed {
-        Deed::Operation(Some(said)) => said.iter().any(moves),
-        _ => false,
-    });
-    let device = |act: &Act| match &subject.program.plan.get(act.step).step {
-        Step::Operation(operation) => operation.device,
-        _ => None,
-    };
-    acts.filter_map(device).collect()
+/// Labware that is put in another place on the way, and whether a person is asked for its first move.
+fn moved(subject: Subject<'_>, performance: &Performance<'_>, origins: &[Span]) -> BTreeMap<InstanceId, bool> {
+    let moves = |said: &Said| said.text.starts_with(MOVES);
+    let origin = |act: &Act| origins.get(act.step.0 as usize).copied();
+    let mut out = BTreeMap::new();
+    let mut asked = None;
+    for act in &performance.acts {
+        if let Deed::Operation(Some(said)) = &act.deed
+            && said.iter().any(moves)
+            && let Step::Operation(operation) = &subject.program.plan.get(act.step).step
+            && let Some(device) = operation.device
+        {
+            out.entry(device).or_insert(asked == origin(act));
+        }
+        asked = matches!(act.deed, Deed::Ask(_)).then(|| origin(act)).flatten();
+    }
+    out
 }
 
 /// The robot whose devices are used, of those that have a driver.

@@ -20,6 +20,7 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
         targets: BTreeMap::new(),
         binned: BTreeSet::new(),
         aimed: None,
+        slots: BTreeMap::new(),
     };
     script.head(protocol);
     let mut found = Vec::new();
@@ -50,7 +51,8 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
                 continue;
             }
         }
-        if !script.call(command) {
+        let is_said = if command.name == "loadLabware" { script.load(command, protocol) } else { script.call(command) };
+        if !is_said {
             found.push(no_call(command));
         }
     }
@@ -79,6 +81,8 @@ struct Script {
     binned: BTreeSet<String>,
     /// The pipette that was brought over an area to drop its tip.
     aimed: Option<String>,
+    /// In which slot labware stands.
+    slots: BTreeMap<String, String>,
 }
 
 /// A text as a literal of Python: JSON's escapes are among Python's.
@@ -157,6 +161,7 @@ impl Script {
             }
             "loadLabware" => {
                 let (id, version) = (text("labwareId"), shown(command.params.get("version")));
+                self.slots.extend(location["slotName"].as_str().map(|slot| (id.to_owned(), slot.to_owned())));
                 let uri = format!("{}/{}/{version}", text("namespace"), text("loadName"));
                 let below = location["moduleId"].as_str().or_else(|| location["labwareId"].as_str());
                 let on = below.unwrap_or("protocol");
@@ -248,6 +253,14 @@ impl Script {
             }
             "moveLabware" => {
                 let to = command.params.get("newLocation").cloned().unwrap_or_default();
+                let before = self.slots.remove(text("labwareId"));
+                self.slots.extend(to["slotName"].as_str().map(|slot| (text("labwareId").to_owned(), slot.to_owned())));
+                if let (Some(slot), "offDeck", "manualMoveWithoutPause") =
+                    (before, to.as_str().unwrap_or_default(), text("strategy"))
+                {
+                    self.line(&format!("del protocol.deck[{}]", quoted(&slot)));
+                    return true;
+                }
                 let place = match (to["slotName"].as_str(), to["moduleId"].as_str().or(to["labwareId"].as_str())) {
                     (Some(slot), _) => quoted(slot),
                     (None, Some(id)) => id.to_owned(),

@@ -1,6 +1,6 @@
 //! Steps as commands: each message of a driver with the identifiers of what it is about.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
@@ -19,13 +19,18 @@ use crate::performance::Said;
 /// The name space of the definitions that come with Opentrons' software.
 const OWN: &str = "opentrons";
 
+/// How the command begins that moves labware.
+pub(super) const MOVES: &str = "moveLabware ";
+
 /// A protocol that is being put together.
 pub(super) struct Writer<'p, 'f> {
     pub(super) protocol: Protocol<'p>,
     pub(super) deck: Deck<'p>,
     pub(super) origins: Vec<Span>,
-    /// Labware that a person puts in another place.
-    pub(super) moved: BTreeSet<InstanceId>,
+    /// Labware that a person puts in another place, and whether somebody is asked for its first move.
+    pub(super) moved: BTreeMap<InstanceId, bool>,
+    /// What loads labware that comes to the deck on the way, without a question.
+    pub(super) later: BTreeMap<InstanceId, Said>,
     pub(super) found: &'f mut Vec<Diagnostic>,
 }
 
@@ -34,6 +39,27 @@ impl Writer<'_, '_> {
     pub(super) fn push(&mut self, name: &'static str, params: Value, at: Span) {
         let Value::Object(params) = params else { return };
         self.protocol.commands.push(Command { name, params, at });
+    }
+
+    /// Loads labware where it is put first.
+    fn bring(&mut self, device: InstanceId, load: &Said, moved: &[Said], at: Span) {
+        self.deck.load(device, About::Labware);
+        for said in moved {
+            let loaded = Message::read(said).and_then(|moved| {
+                let place = moved.get("newLocation").unwrap_or_default().to_owned();
+                let mut message = Message::read(load)?;
+                for (field, value) in &mut message.fields {
+                    if *field == "location" {
+                        value.clone_from(&place);
+                    }
+                }
+                self.command(device, &message, at)
+            });
+            match loaded {
+                Ok(command) => self.protocol.commands.push(command),
+                Err(d) => self.found.push(d),
+            }
+        }
     }
 
     /// A person who is asked to move labware, as the robot itself asks: it waits for that by itself.
@@ -59,11 +85,16 @@ impl Writer<'_, '_> {
             Err(d) => return self.found.push(d),
         };
         let (robot, at) = (self.protocol.robot.device, self.protocol.subject.program.scene.get(wired.device).span);
+        let comes = message.get("location").is_some_and(|location| self.deck.location(location).is_none());
+        if message.form.about == About::Labware && comes && self.moved.get(&wired.device) == Some(&false) {
+            self.later.insert(wired.device, said.clone());
+            return;
+        }
         let here = match message.form.about {
             About::Robot => true,
             About::Pipette => belongs(self.protocol.subject, wired.device, robot),
             About::Labware | About::Module => match message.get("location") {
-                Some(location) => self.deck.location(location).is_some() || self.moved.contains(&wired.device),
+                Some(location) => self.deck.location(location).is_some() || self.moved.contains_key(&wired.device),
                 None => self.deck.get(wired.device).is_some(),
             },
             About::Well => self.deck.well(wired.device).is_some() && message.get("volume") != Some("0"),
@@ -114,6 +145,9 @@ impl Writer<'_, '_> {
             };
             return self.found.push(d);
         };
+        if let Some(load) = self.later.remove(&device) {
+            return self.bring(device, &load, said, at);
+        }
         if self.deck.get(device).is_none() && device != self.protocol.robot.device {
             let headline =
                 format!("`{}` is not a part of `{}`", self.name(device), self.name(self.protocol.robot.device));

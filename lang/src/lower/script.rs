@@ -12,6 +12,7 @@ use super::call::Bound;
 use crate::ast::{
     Arg, ClauseKind, Exchange, Expr, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind,
 };
+use crate::declare::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 
@@ -111,10 +112,10 @@ impl<'a> Planner<'a, '_> {
             return Vec::new();
         };
         let mut open = self.states_of(condition.node);
-        let mut waits = Vec::new();
+        let mut found = Vec::new();
         for id in (0..self.lab.instances.len() as u32).map(InstanceId) {
             if open.is_empty() {
-                return waits;
+                break;
             }
             let drivers = self.drivers_of(id, &transport);
             let lines = drivers.iter().flat_map(|d| d.wires);
@@ -138,20 +139,29 @@ impl<'a> Planner<'a, '_> {
                 if !open.iter().any(|state| covered.contains(state)) {
                     continue;
                 }
-                let bound = Bound { values: Vec::new() };
-                let Some((mut operation, _)) = self.operation(sig, clauses, &bound, &mut scope) else { continue };
-                operation.device = Some(id);
-                operation.claims.insert(0, id);
-                let label = format!("{} {}", verb_text(&sig.verb), self.lab.instances[id.0 as usize].name);
-                let step = self.add(label, span, Step::Operation(Box::new(operation)));
-                self.say(id, sig, &bound, step);
-                self.note_call(sig, &bound, Some((id, true)), step);
-                waits.push(step);
+                found.push((id, m));
                 open.retain(|state| !covered.contains(state));
                 break;
             }
         }
-        if open.is_empty() { waits } else { Vec::new() }
+        if !open.is_empty() {
+            return Vec::new();
+        }
+        found.into_iter().filter_map(|(id, m)| self.own_wait(id, m, span)).collect()
+    }
+
+    /// A command of a device that has no arguments, as a step.
+    fn own_wait(&mut self, id: InstanceId, m: MemberRef<'a>, span: Span) -> Option<StepId> {
+        let MemberKind::Command { sig, clauses } = &m.member.kind else { return None };
+        let bound = Bound { values: Vec::new() };
+        let (mut operation, _) = self.operation(sig, clauses, &bound, &mut Scope::of_member(id, m))?;
+        operation.device = Some(id);
+        operation.claims.insert(0, id);
+        let label = format!("{} {}", verb_text(&sig.verb), self.lab.instances[id.0 as usize].name);
+        let step = self.add(label, span, Step::Operation(Box::new(operation)));
+        self.say(id, sig, &bound, step);
+        self.note_call(sig, &bound, Some((id, true)), step);
+        Some(step)
     }
 
     /// The states that a value depends on; none where it depends on anything else that changes.
