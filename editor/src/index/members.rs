@@ -273,7 +273,10 @@ impl Index {
         let all = kinds.iter().flat_map(|k| self.ancestors(*k));
         for def in all.filter_map(|k| self.of_decl(*k)).flat_map(|d| self.insides_of(d)) {
             let d = self.def(def);
-            let again = d.kind != Kind::Command && out.iter().any(|o| self.def(*o).name == d.name);
+            let again = match d.kind {
+                Kind::Command => self.is_replaced(def, &out),
+                _ => out.iter().any(|o| self.def(*o).name == d.name),
+            };
             if !again && !out.contains(&def) {
                 out.push(def);
             }

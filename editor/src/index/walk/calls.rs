@@ -112,7 +112,7 @@ impl Walk<'_> {
                     None => Sort::Any,
                 }
             };
-            let mut best: Option<(usize, DefId)> = None;
+            let mut fitting: Vec<(usize, DefId)> = Vec::new();
             for def in &all {
                 let lacking = match self.index.def(*def).kind {
                     Kind::Command => {
@@ -126,12 +126,11 @@ impl Walk<'_> {
                         if fits { 0 } else { 100 }
                     }
                 };
-                let misfit = lacking + self.misfit(*def, call);
-                if best.is_none_or(|(least, _)| misfit < least) {
-                    best = Some((misfit, *def));
-                }
+                fitting.push((lacking + self.misfit(*def, call), *def));
             }
-            return best.map(|(_, def)| Verb { def, words });
+            let least = fitting.iter().map(|(misfit, _)| *misfit).min()?;
+            let best: Vec<DefId> = fitting.iter().filter(|(misfit, _)| *misfit == least).map(|(_, def)| *def).collect();
+            return self.index.most_derived(&best).map(|def| Verb { def, words });
         }
         None
     }
@@ -209,7 +208,8 @@ impl Walk<'_> {
     pub(super) fn verb_of(&mut self, words: &[Name], device: &Sort) -> Option<DefId> {
         let span = verb_span(words)?;
         let all: Vec<DefId> = self.index.verbs(&verb_text(words)).collect();
-        let def = all.iter().copied().find(|d| self.index.can(device, *d)).or(all.first().copied());
+        let own: Vec<DefId> = all.iter().copied().filter(|d| self.index.can(device, *d)).collect();
+        let def = self.index.most_derived(&own).or(all.first().copied());
         self.note(span, def.map_or(Meaning::Unknown, Meaning::Def));
         def
     }
@@ -228,6 +228,29 @@ impl Index {
         let (Sort::Thing(kinds, _), Sort::Thing(wanted, _)) = (given, taken) else { return true };
         let has = |kind: &DeclId| kinds.iter().any(|k| k == kind || self.ancestors(*k).contains(kind));
         kinds.is_empty() || wanted.is_empty() || wanted.iter().all(has)
+    }
+
+    /// The first of some commands of one thing that no more derived capability declares again.
+    fn most_derived(&self, commands: &[DefId]) -> Option<DefId> {
+        commands.iter().copied().find(|d| !self.is_replaced(*d, commands))
+    }
+
+    /// Whether one of some commands of one thing is declared again by a capability that extends that of this one.
+    pub(crate) fn is_replaced(&self, command: DefId, others: &[DefId]) -> bool {
+        let owner = |d: DefId| self.def(d).owner.and_then(|owner| self.decl_of(owner));
+        let Some(own) = owner(command).filter(|_| self.def(command).kind == Kind::Command) else { return false };
+        others.iter().copied().filter(|d| *d != command && self.def(*d).kind == Kind::Command).any(|other| {
+            let extends = |of| of != own && self.ancestors(of).contains(&own);
+            owner(other).is_some_and(extends)
+                && self.def(other).name == self.def(command).name
+                && self.prepositions(other) == self.prepositions(command)
+        })
+    }
+
+    /// The prepositions of a command's parameters, none for those right behind its verb.
+    fn prepositions(&self, command: DefId) -> Vec<Option<&str>> {
+        let inside = self.def(command).inside.iter().map(|p| self.def(*p));
+        inside.filter(|p| p.kind == Kind::Parameter).map(|p| p.label.as_deref()).collect()
     }
 
     /// Whether a thing has the capability of a command.
