@@ -27,21 +27,26 @@ pub fn read(path: &Path) -> Result<Calibration, String> {
     }
     let wrong = |why: String| format!("`{}`: {why}", path.display());
     let text = String::from_utf8(files::read(path)?).map_err(|_| wrong("it is not text".to_owned()))?;
-    let mut given = Vec::new();
+    let mut given: Vec<Gauged> = Vec::new();
+    // Spreadsheets put a mark before the first line.
+    let first = text.trim_start_matches('\u{feff}').lines().next().unwrap_or_default();
+    if first.split(',').map(str::trim).ne(HEAD) {
+        return Err(wrong(format!("its first line must be `{}`", HEAD.join(","))));
+    }
     let mut at = 0;
     for (index, line) in text.split_inclusive('\n').enumerate() {
         let start = at;
         at += line.len();
         let line = line.trim_end();
-        if index == 0 && line.split(',').map(str::trim).ne(HEAD) {
-            return Err(wrong(format!("its first line must be `{}`", HEAD.join(","))));
-        }
         if index == 0 || line.is_empty() {
             continue;
         }
         let (rack, taken) = line.split_once(',').unwrap_or((line, ""));
         if taken.trim().parse::<u32>().is_err() {
             return Err(wrong(format!("line {}: `{}` is not how many tips were taken", index + 1, taken.trim())));
+        }
+        if given.iter().any(|known| known.thing.0 == rack.trim()) {
+            return Err(wrong(format!("line {}: `{}` stands there twice", index + 1, rack.trim())));
         }
         let value = start + rack.len() + 1..start + line.len();
         let thing = (rack.trim().to_owned(), start..start + rack.len());
@@ -50,14 +55,28 @@ pub fn read(path: &Path) -> Result<Calibration, String> {
     Ok(Calibration { name: path.display().to_string(), text, given })
 }
 
-/// Whether a lab names each of its racks by itself, as the file does; `Err` says which it does not.
-pub fn agrees(program: &Program) -> Result<(), String> {
-    match racks(program).find(|(_, rack)| rack.name.contains(['[', '.'])) {
-        Some((_, rack)) => {
-            Err(format!("`--tips` needs racks that the lab declares one by one; `{}` is one of several", rack.name))
-        }
-        None => Ok(()),
+/// Whether a lab names each of its racks by itself, as the file does, and they have so many tips; `Err` says which does not.
+pub fn agrees(kept: &Calibration, program: &Program) -> Result<(), String> {
+    if let Some((_, rack)) = racks(program).find(|(_, rack)| rack.name.contains(['[', '.'])) {
+        return Err(format!(
+            "`--tips` needs racks that the lab declares one by one; `{}` is one of several",
+            rack.name
+        ));
     }
+    for gauged in &kept.given {
+        let taken = kept.text[gauged.value.clone()].trim().parse::<usize>().unwrap_or(0);
+        let rack = racks(program).find(|(_, rack)| rack.name == gauged.thing.0);
+        let tips = rack.map_or(0, |(id, _)| tips_of(program, id).count());
+        if taken > tips {
+            return Err(format!("`{}`: {taken} of the {tips} tips of `{}` were taken", kept.name, gauged.thing.0));
+        }
+    }
+    Ok(())
+}
+
+/// The tips of a rack, in the order of its columns.
+fn tips_of(program: &Program, rack: usize) -> impl Iterator<Item = &Instance> {
+    program.scene.instances.iter().filter(move |tip| tip.owner.is_some_and(|owner| owner.0 as usize == rack))
 }
 
 /// Writes how far the racks of a lab are used up, by the states at the end of a run.
@@ -79,8 +98,7 @@ fn taken(program: &Program, states: &[Option<f64>]) -> Vec<(String, usize)> {
     let value = |name: &str| index.get(name).and_then(|at| states.get(*at).copied().flatten()).unwrap_or(0.0);
     racks(program)
         .map(|(id, rack)| {
-            let of_rack = |tip: &&Instance| tip.owner.is_some_and(|owner| owner.0 as usize == id);
-            let tips = program.scene.instances.iter().filter(of_rack).enumerate();
+            let tips = tips_of(program, id).enumerate();
             let picked = tips.filter(|(_, tip)| value(&format!("{}.{PICKED}", tip.name)) != 0.0).map(|(at, _)| at + 1);
             let emptied = value(&format!("{}.{EMPTIED}", rack.name)) as usize;
             (rack.name.clone(), picked.max().unwrap_or(0).max(emptied))

@@ -151,8 +151,8 @@ pub fn open(
                     say(
                         own(condition.span),
                         format!("{what} would go on before `{}` holds", condition.text),
-                        "the device waits for its set point, and this does not hold there",
-                        "wait for what holds at its set point",
+                        "the device waits by itself until it is at its set point, to its tolerance, and this does not hold there",
+                        "wait for what holds there, or for a fixed, sufficient time",
                     );
                 }
             }

@@ -20,14 +20,14 @@ pub fn emit(args: &EmitArgs, color: Color) -> Exit {
 fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let kept = args.tips.as_deref().map(tips::read).transpose()?.unwrap_or_default();
-    let options = Options { measured: kept, ..args.subject.options() };
+    let options = Options { measured: kept.clone(), ..args.subject.options() };
     let (sources, wired, mut found) = pipeline::wire(&input, &options, args.target.wire());
     let is_wrong = |found: &[Diagnostic]| found.iter().any(Diagnostic::is_error);
     let cancel = cancel::on_interrupt()?;
     let mut written = None;
     if let Some((program, wiring)) = wired.filter(|_| !is_wrong(&found)) {
         if args.tips.is_some() {
-            tips::agrees(&program)?;
+            tips::agrees(&kept, &program)?;
         }
         found.extend(pipeline::motions(&program, &*cache::of(args.no_cache)));
         if !is_wrong(&found) {

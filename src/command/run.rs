@@ -31,7 +31,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     }
     let mut findings = Findings::new(args.format, color);
     let kept = args.tips.as_deref().map(tips::read).transpose()?.unwrap_or_default();
-    let options = Options { measured: kept, ..args.subject.options() };
+    let options = Options { measured: kept.clone(), ..args.subject.options() };
     let (sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
@@ -40,7 +40,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         return Ok(Exit::Findings);
     };
     if args.tips.is_some() {
-        tips::agrees(&program)?;
+        tips::agrees(&kept, &program)?;
     }
     let drawn = reality.draw(&mut program, args.seed)?;
     let found = match reality.moves() && !args.dry {

@@ -142,3 +142,36 @@ fn pipettes_keep_off_a_heater_shaker_as_the_robot_demands() {
     let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
     assert!(flat(&ended.out).contains("refuses a module beside a heater-shaker"), "{}", ended.out);
 }
+
+#[test]
+fn a_thermocycler_fills_four_places() {
+    let text = |cycler: &str, steps: &str| {
+        format!(
+            r#"mtx 1
+use std::opentrons::{{Corning96, OT2, ThermocyclerGen2}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 at (0, 0, 0) m
+    cycler = ThermocyclerGen2 on ot2.slot[{cycler}]
+    plate = Corning96 on ot2.slot[3]
+}}
+workflow w in deck {{ {steps} }}
+"#
+        )
+    };
+    let dir = folder("cyclers_places");
+    let cases = [
+        ("7", "relocate plate to ot2.slot[9]", None),
+        ("7", "relocate plate to ot2.slot[8]", Some("the thermocycler fills the places 7, 8, 10 and 11")),
+        ("1", "wait 1 s", Some("takes a thermocycler in place 7 only")),
+    ];
+    for (place, steps, said) in cases {
+        write(&dir, "lab.mtx", text(place, steps));
+        let ended = matterixc_in(&dir, &["check", "--strict", "lab.mtx"]);
+        let found = flat(&ended.out);
+        match said {
+            Some(said) => assert!(ended.code == 1 && found.contains(said), "{place}: {}", ended.out),
+            None => assert_eq!(ended.code, 0, "{place}: {}", ended.out),
+        }
+    }
+}

@@ -408,6 +408,10 @@ workflow w in deck {
         python.contains("second = protocol.load_labware(\"corning_96_wellplate_360ul_flat\", protocol_api.OFF_DECK"),
         "{python}"
     );
+    // What stands off the deck no pipette reaches.
+    let there = "    relocate plate to table\n    transfer 50 uL from stock[A1] to plate[C1] by ot2.left using tips { tips: once }\n";
+    let said = flat(&refused("emit_off", &text.replace("    relocate plate to table\n", there), "opentrons-json"));
+    assert!(said.contains("cannot reach `plate[C1]`"), "{said}");
     // The latch holds it.
     write(&dir, "lab.mtx", text.replace("    open latch shaker\n", ""));
     let ended = matterixc_in(&dir, &["check", "lab.mtx"]);

@@ -958,9 +958,12 @@ workflow w in deck {
     );
     emit();
     assert_eq!(kept(), "rack,taken\ntips,40\nmore,11\n");
-    for (table, said) in
-        [("tips,40\n", "first line must be `rack,taken`"), ("rack,taken\ntips,many\n", "line 2: `many`")]
-    {
+    for (table, said) in [
+        ("tips,40\n", "first line must be `rack,taken`"),
+        ("", "first line must be `rack,taken`"),
+        ("rack,taken\ntips,5\ntips,3\n", "line 3: `tips` stands there twice"),
+        ("rack,taken\ntips,many\n", "line 2: `many`"),
+    ] {
         write(&dir, "tips.csv", table);
         let ended = emit();
         assert!(ended.code == 2 && ended.err.contains(said), "{}", ended.err);

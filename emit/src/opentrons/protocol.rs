@@ -67,6 +67,7 @@ impl<'p> Protocol<'p> {
             deck: Deck::new(&subject.program.scene, robot.device),
             moved: moved(subject, performance, &origins),
             later: BTreeMap::new(),
+            off: BTreeSet::new(),
             origins,
             protocol: Protocol {
                 subject,

@@ -1,6 +1,6 @@
 //! Steps as commands: each message of a driver with the identifiers of what it is about.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
@@ -29,6 +29,8 @@ pub(super) struct Writer<'p, 'f> {
     pub(super) origins: Vec<Span>,
     /// Labware that a person puts in another place, and whether somebody is asked for its first move.
     pub(super) moved: BTreeMap<InstanceId, bool>,
+    /// Labware that stands off the deck now.
+    pub(super) off: BTreeSet<InstanceId>,
     /// What loads labware that comes to the deck on the way, without a question.
     pub(super) later: BTreeMap<InstanceId, Said>,
     pub(super) found: &'f mut Vec<Diagnostic>,
@@ -213,7 +215,9 @@ impl Writer<'_, '_> {
                     place[*name] = (parsed(message, name, value)? + 0.0).into();
                 }
                 Holds::Location => {
-                    let location = match self.deck.location_or_off(value) {
+                    let location = self.deck.location_or_off(value);
+                    let _ = if location == Location::Off { self.off.insert(device) } else { self.off.remove(&device) };
+                    let location = match location {
                         Location::Slot(slot) => json!({ "slotName": slot }),
                         Location::Module(id) => json!({ "moduleId": id }),
                         Location::Labware(id) => json!({ "labwareId": id }),
@@ -236,10 +240,11 @@ impl Writer<'_, '_> {
         let all = names(value);
         let mut places = Vec::new();
         for name in &all {
-            let place = scene.find(name).and_then(|id| self.deck.well(id));
+            let is_off = |id: &InstanceId| scene.get(*id).owner.is_some_and(|owner| self.off.contains(&owner));
+            let place = scene.find(name).filter(|id| !is_off(id)).and_then(|id| self.deck.well(id));
             let Some(place) = place else {
                 let headline = format!("`{name}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
-                let help = "place it on the deck, or on a module there, before the workflow starts";
+                let help = "place it on the deck, or on a module there, before this step";
                 return Err(not_expressible(at, headline, "this step goes there").help(help));
             };
             places.push(place);

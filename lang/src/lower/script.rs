@@ -158,9 +158,15 @@ impl<'a> Planner<'a, '_> {
         operation.device = Some(id);
         operation.claims.insert(0, id);
         let label = format!("{} {}", verb_text(&sig.verb), self.lab.instances[id.0 as usize].name);
-        let step = self.add(label, span, Step::Operation(Box::new(operation)));
+        let needs = operation.needs.clone();
+        let mut step = self.add(label.clone(), span, Step::Operation(Box::new(operation)));
         self.say(id, sig, &bound, step);
         self.note_call(sig, &bound, Some((id, true)), step);
+        // A device that was switched off waits for nothing.
+        for need in needs {
+            let condition = Condition::clone(&need);
+            step = self.add(label.clone(), span, Step::If { condition, then: step, otherwise: None });
+        }
         Some(step)
     }
 
