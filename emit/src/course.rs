@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::{Condition, Plan, Step, StepId};
+use matterix_ir::plan::{Condition, Plan, Step};
 use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, NodeId, Op, Program, Sources, Span, codes};
 
@@ -145,17 +145,6 @@ pub fn open(
                 "known only during the run",
                 "write the number of turns",
             ),
-            Step::Wait { .. } if wiring.awaited.contains_key(&StepId(index as u32)) => {
-                let never = |a: &Act| a.step.0 as usize == index && a.deed == Deed::Awaited { holds: false };
-                if let (true, Some(condition)) = (acts.iter().any(never), wiring.awaited.get(&StepId(index as u32))) {
-                    say(
-                        own(condition.span),
-                        format!("{what} would go on before `{}` holds", condition.text),
-                        "the device waits by itself until it is at its set point, to its tolerance, and this does not hold there",
-                        "wait for what holds there, or for a fixed, sufficient time",
-                    );
-                }
-            }
             Step::Wait { duration } if course.is_open(*duration) => {
                 say(at, format!("{what} needs a fixed duration"), "known only during the run", "write the duration")
             }
@@ -199,6 +188,17 @@ pub fn open(
                 "put its steps where they should run",
             ),
             _ => {}
+        }
+    }
+    for (step, condition) in &wiring.awaited {
+        if acts.iter().any(|act| act.step == *step && act.deed == Deed::Awaited { holds: false }) {
+            let at = origins.get(step.0 as usize).copied().unwrap_or_default();
+            say(
+                if library(condition.span) { at } else { condition.span },
+                format!("{what} would go on before `{}` holds", condition.text),
+                "the device waits by itself until it is at its set point, to its tolerance, and this does not hold there",
+                "wait for what holds there, or for a fixed, sufficient time",
+            );
         }
     }
     for act in acts.iter().filter(|a| matches!(a.deed, Deed::Operation(Some(_)))) {

@@ -67,7 +67,7 @@ def robot(attached, models=tuple(KINDS)):
         port = free.getsockname()[1]
     modules = {}
     for model in models or ["temperatureModuleV2"]:
-        of_kind = modules.setdefault(KINDS[re.sub(r"V\d", "V2", model)] if model not in KINDS else KINDS[model], [])
+        of_kind = modules.setdefault(next(kind for known, kind in KINDS.items() if known[:-2] == model[:-2]), [])
         of_kind.append({"model": model, "serial_number": f"{model}{len(of_kind)}", "calls": []})
     simulated = pathlib.Path(FOLDER) / f"{port}.json"
     simulated.write_text(json.dumps({"machine": "OT-2 Standard", "attached_instruments": attached, "attached_modules": modules}))

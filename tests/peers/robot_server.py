@@ -325,6 +325,12 @@ def own_labware(command, folder, file):
     verdict("labware of one's own", good, f"{len(robot.commands)} commands" if good else ended.stderr[-1500:])
 
 
+def no_tip(data):
+    """The tip is not picked up."""
+    if data["commandType"] == "pickUpTip":
+        data["commandType"], data["params"] = "comment", {"message": "the tip is left where it is"}
+
+
 def spoiled(command, folder, file):
     """Commands that the engine refuses."""
     text = pathlib.Path(file).read_text()
@@ -332,10 +338,6 @@ def spoiled(command, folder, file):
     def too_much(data):
         if data["commandType"] == "aspirate":
             data["params"]["volume"] = 400
-
-    def no_tip(data):
-        if data["commandType"] == "pickUpTip":
-            data["commandType"], data["params"] = "comment", {"message": "the tip is left where it is"}
 
     def no_well(data):
         if data["commandType"] == "dispense":
@@ -368,12 +370,6 @@ def spoiled(command, folder, file):
 def left_on(command, folder, file):
     """A run that fails while modules are on: each is switched off, by the identifier that the server gives to it."""
     text = pathlib.Path(file).read_text()
-    robot = Robot()
-
-    def no_tip(data):
-        if data["commandType"] == "pickUpTip":
-            data["commandType"], data["params"] = "comment", {"message": "the tip is left where it is"}
-
     for name, spoil, stop_at, failure in [("cut", no_tip, None, "no_tip"), ("halted", None, "aspirate", "run_stopped")]:
         robot = Robot()
         robot.spoil, robot.stop_at = spoil, stop_at

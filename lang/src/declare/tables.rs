@@ -241,19 +241,23 @@ impl<'a> Tables<'a> {
     /// The members that no more derived capability declares again: those with a name by that, commands by their words and labels.
     pub fn visible(&self, members: Vec<MemberRef<'a>>) -> Vec<MemberRef<'a>> {
         let mut alike: FxHashMap<&str, Vec<DeclId>> = FxHashMap::default();
-        let mut commands: FxHashMap<String, Vec<(&Sig, DeclId)>> = FxHashMap::default();
+        let mut commands: FxHashMap<&str, Vec<(&Sig, DeclId)>> = FxHashMap::default();
+        let first = |sig: &'a Sig| sig.verb.first().map_or("", |word| word.text.as_str());
         for member in &members {
             if let Some(name) = member_name(member.member) {
                 alike.entry(&name.text).or_default().push(member.owner);
             } else if let MemberKind::Command { sig, .. } = &member.member.kind {
-                commands.entry(verb_text(&sig.verb)).or_default().push((sig, member.owner));
+                commands.entry(first(sig)).or_default().push((sig, member.owner));
             }
         }
         let hides = |o: &DeclId, m: &MemberRef<'a>| *o != m.owner && self.kinds.get(o).is_some_and(|k| k.has(m.owner));
         let hidden = |m: &MemberRef<'a>| match &m.member.kind {
-            MemberKind::Command { sig, .. } => commands
-                .get(&verb_text(&sig.verb))
-                .is_some_and(|all| all.iter().any(|(other, o)| hides(o, m) && other.has_form_of(sig))),
+            MemberKind::Command { sig, .. } => {
+                let words = |sig: &'a Sig| sig.verb.iter().map(|word| &word.text);
+                let again = |other: &'a Sig| words(other).eq(words(sig)) && other.has_form_of(sig);
+                let all = commands.get(first(sig)).into_iter().flatten();
+                all.into_iter().any(|(other, o)| hides(o, m) && again(other))
+            }
             _ => {
                 let others = member_name(m.member).and_then(|name| alike.get(name.text.as_str()));
                 others.is_some_and(|owners| owners.iter().any(|o| hides(o, m)))

@@ -117,26 +117,17 @@ impl<'a> Planner<'a, '_> {
             if open.is_empty() {
                 break;
             }
-            let drivers = self.drivers_of(id, &transport);
-            let lines = drivers.iter().flat_map(|d| d.wires);
-            let said: Vec<&Sig> = lines
-                .filter_map(|wire| match &wire.kind {
-                    WireKind::Command { sig, .. } if sig.all_params().next().is_none() => Some(sig),
-                    _ => None,
-                })
-                .collect();
-            let own: Vec<_> = self.lab.all_members(id).to_vec();
-            for m in own {
+            for m in self.lab.all_members(id).iter().copied() {
                 let MemberKind::Command { sig, clauses } = &m.member.kind else { continue };
                 let lasts = clauses.iter().find_map(|clause| match &clause.kind {
                     ClauseKind::Until(e) => Some(e),
                     _ => None,
                 });
-                let Some(lasts) = lasts.filter(|_| said.iter().any(|line| fits(line, sig))) else { continue };
+                let Some(lasts) = lasts.filter(|_| sig.all_params().next().is_none()) else { continue };
                 let mut scope = Scope::of_member(id, m);
                 let Some(until) = self.lab.truth(lasts, &mut scope) else { continue };
                 let covered = self.states_of(until);
-                if !open.iter().any(|state| covered.contains(state)) {
+                if !open.iter().any(|state| covered.contains(state)) || !self.has_line(id, sig, &transport) {
                     continue;
                 }
                 found.push((id, m));
@@ -148,6 +139,13 @@ impl<'a> Planner<'a, '_> {
             return Vec::new();
         }
         found.into_iter().filter_map(|(id, m)| self.own_wait(id, m, span)).collect()
+    }
+
+    /// Whether a driver of a device over a wire has a line for a command.
+    fn has_line(&self, device: InstanceId, command: &Sig, transport: &str) -> bool {
+        let drivers = self.drivers_of(device, transport);
+        let is_line = |wire: &Wire| matches!(&wire.kind, WireKind::Command { sig, .. } if fits(sig, command));
+        drivers.iter().flat_map(|d| d.wires).any(is_line)
     }
 
     /// A command of a device that has no arguments, as a step.

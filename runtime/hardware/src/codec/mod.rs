@@ -234,9 +234,8 @@ impl Codec {
         }
     }
 
-    /// The device's end: an answer that several drivers ask for in the same words; each finds what it expects. Only servers give such answers.
-    pub fn joined(&self, answers: &[String]) -> Option<String> {
-        let Codec::Json(_) = self else { return None };
+    /// A server's end: an answer that several drivers ask for in the same words; each finds what it expects.
+    pub fn joined(answers: &[String]) -> Option<String> {
         let (first, rest) = answers.split_first()?;
         let fields = rest.iter().filter_map(|answer| Some(answer.split_once(' ')?.1));
         Some(std::iter::once(first.as_str()).chain(fields).collect::<Vec<_>>().join(" "))

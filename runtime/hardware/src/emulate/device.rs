@@ -169,6 +169,7 @@ impl<'m> Device<'_, 'm> {
             return Ok(Some(Reply::of(text)));
         }
         if let Some(told) = self.asked(word) {
+            self.speak_for(|driver| driver.told.iter().any(|of| std::ptr::eq(of, told)));
             return Ok(Some(Reply::of(self.tells(told)?)));
         }
         // What is asked for the end of something that was never said asks for something else.
@@ -216,22 +217,30 @@ impl<'m> Device<'_, 'm> {
 
     /// The answer of a server to a question that several devices at it ask, or one for several reasons: that of each.
     fn asked_by_several(&mut self, word: &str) -> Result<Option<String>, Fault> {
-        let drivers = self.drivers;
-        let mut answers = Vec::new();
-        for driver in drivers {
-            self.codec.speak_for(driver);
-            let told = driver.told.iter().filter(|t| t.heard.is_none());
-            for told in told.filter(|t| self.codec.found(&t.asks, word).is_some()).collect::<Vec<_>>() {
-                answers.push(self.tells(told)?);
-            }
-            for exchange in driver.open.iter().filter(|e| e.until.is_none() && e.sends.len() == 1) {
-                let asks = exchange.sends.iter().any(|t| self.codec.is_word(&template::written(t), word));
-                if let (true, Some(expects)) = (asks, &exchange.expects) {
-                    answers.push(self.plain(expects.of(0)));
-                }
-            }
+        if !matches!(self.codec, Codec::Json(_)) {
+            return Ok(None);
         }
-        Ok(if answers.len() > 1 { self.codec.joined(&answers) } else { None })
+        let mut asking = Vec::new();
+        for driver in self.drivers {
+            let told = driver.told.iter().filter(|t| t.heard.is_none() && self.codec.found(&t.asks, word).is_some());
+            let asks = |e: &&Exchange| match e.sends.as_slice() {
+                [sent] => e.until.is_none() && self.codec.is_word(&template::written(sent), word),
+                _ => false,
+            };
+            let opens = driver.open.iter().filter(asks).filter_map(|e| e.expects.as_ref());
+            let of_told = told.map(|told| (driver, Some(told), None));
+            asking.extend(of_told.chain(opens.map(|expects| (driver, None, Some(expects.of(0))))));
+        }
+        if asking.len() < 2 {
+            return Ok(None);
+        }
+        let mut answers = Vec::new();
+        for (driver, told, expects) in asking {
+            self.codec.speak_for(driver);
+            answers.extend(told.map(|told| self.tells(told)).transpose()?);
+            answers.extend(expects.map(|expects| self.plain(expects)));
+        }
+        Ok(Codec::joined(&answers))
     }
 
     /// An answer without numbers of its own.
