@@ -11,7 +11,7 @@ pub struct Kind {
 }
 
 /// All of them.
-pub const KINDS: [Kind; 7] = [
+pub const KINDS: [Kind; 8] = [
     Kind {
         name: "beakers",
         text: "heated beakers, each on its own hotplate",
@@ -26,6 +26,12 @@ pub const KINDS: [Kind; 7] = [
         sizes: &[10, 30, 100],
     },
     Kind { name: "plates", text: "plates filled well by well", program: plates, sizes: &[1, 2, 4, 8] },
+    Kind {
+        name: "modules",
+        text: "wells filled one by one on a temperature module",
+        program: modules,
+        sizes: &[96, 192, 384],
+    },
     Kind {
         name: "titrations",
         text: "carbonate solutions, into each of which acid flows, at equilibrium",
@@ -138,6 +144,24 @@ fn plates(count: usize) -> String {
         );
     }
     out.push_str("}\n");
+    out
+}
+
+/// Wells on a temperature module, filled one by one.
+fn modules(count: usize) -> String {
+    let mut out = String::from(
+        "mtx 1\nuse std::opentrons::{OT2, P20Single, Reservoir12, TemperatureModule, TipRack20}\n\nasset Plate384 from labware \"corning_384_wellplate_112ul_flat/2\"\n\nlab deck {\n    ambient: 22 degC\n    ot2 = OT2 { left: P20Single } at (0, 0, 0) m\n",
+    );
+    out.push_str("    cold = TemperatureModule on ot2.slot[3]\n    plate = Plate384 on cold\n    tips = TipRack20 on ot2.slot[1]\n");
+    out.push_str(
+        "    stock = Reservoir12 on ot2.slot[6] holding { A1: 10 mL of water }\n}\n\nworkflow fill in deck {\n",
+    );
+    out.push_str("    heat cold to 37 degC\n    settle cold\n    pick up tip from tips by ot2.left\n");
+    let _ = writeln!(out, "    for w in plate.wells[0 .. {}] {{", count - 1);
+    out.push_str(
+        "        aspirate 10 uL from stock[A1] by ot2.left\n        dispense 10 uL into w by ot2.left\n    }\n",
+    );
+    out.push_str("    drop tip by ot2.left\n    stop heating cold\n}\n");
     out
 }
 

@@ -50,7 +50,7 @@ pub(super) const CLOSE_IN: f64 = 1.0 / (1 << 24) as f64;
 const NARROWINGS: usize = 6;
 
 /// A face that came in by no more than this share of its distance has come to rest.
-const AT_REST: f64 = 1e-6;
+pub(super) const AT_REST: f64 = 1e-6;
 
 /// Steps into which a time is divided that is followed closely.
 const CLOSE_STEPS: usize = 16;
@@ -71,18 +71,26 @@ const ROUNDS: usize = 8;
 type Rates = BTreeMap<u32, (f64, f64)>;
 
 /// Bounds that hold for all time to come, while nothing else changes.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct InvariantBox {
     /// By state.
     pub(super) states: BTreeMap<u32, (f64, f64)>,
     /// How far what goes on can go, and what states that it changes are without it.
-    bonds: Option<Rc<Bonds>>,
-    /// What each derivative that moves has to do with others.
+    pub(super) bonds: Option<Rc<Bonds>>,
+    /// What each derivative that moves has to do with others, where it has been asked for since the derivative changed.
     pub(super) ties: BTreeMap<u32, Rc<Ties>>,
     /// By derivative, its bounds within the box; those of amounts follow from how far what goes on can go.
-    rates: Rates,
+    pub(super) rates: Rates,
     /// States of which nothing counted as known, for concurrent steps may set them.
     pub(super) veiled: Vec<u32>,
+}
+
+impl InvariantBox {
+    /// Whether what is known of a state lies within its faces.
+    pub(super) fn contains(&self, state: u32, facts: &AbstractState) -> bool {
+        let (low, high) = facts.states[state as usize].bounds();
+        self.states.get(&state).is_some_and(|(least, most)| least <= &low && &high <= most)
+    }
 }
 
 /// A pair of faces of the box, by derivative.
@@ -95,7 +103,7 @@ pub(super) enum Wall {
 }
 
 /// What a derivative is of.
-enum Kind {
+pub(super) enum Kind {
     /// An amount: what it is at first and what goes on.
     Matter(Rc<Row>),
     /// Something that fluxes of matter change besides others.
@@ -120,6 +128,28 @@ pub(super) struct Making {
     pub(super) faces: usize,
     /// The walls whose lower, and whose upper, faces were moved out together.
     pub(super) together: [Vec<Wall>; 2],
+}
+
+impl Making {
+    /// A box around what is known, in which nothing moves yet.
+    pub(super) fn around(facts: &AbstractState) -> Self {
+        Making {
+            within: facts.clone(),
+            whole: BTreeMap::new(),
+            active: BTreeSet::new(),
+            ways: BTreeMap::new(),
+            moving: BTreeSet::new(),
+            faces: 0,
+            together: Default::default(),
+        }
+    }
+
+    /// Takes over faces of a state that moves.
+    pub(super) fn take_over(&mut self, derivative: u32, state: u32, (low, high): (f64, f64)) {
+        self.within.states[state as usize] = AbstractValue::Range(low, high, Imprecision::Unknown);
+        self.moving.insert(derivative);
+        self.faces += 1;
+    }
 }
 
 impl Interpreter<'_, '_> {
@@ -308,7 +338,7 @@ impl Interpreter<'_, '_> {
             !facts.unsettled.is_empty() || facts.bonds.as_ref().is_some_and(|bonds| !bonds.all_hold(facts));
         let barrier = match facts.barrier.take().filter(|barrier| barrier.veiled == self.veiled) {
             Some(barrier) if !has_changed => barrier,
-            known => Rc::new(self.barrier(known.as_deref(), facts)),
+            known => Rc::new(self.barrier(known.map(Rc::unwrap_or_clone), facts)),
         };
         facts.barrier = Some(barrier.clone());
         facts.unsettled.clear();
@@ -443,7 +473,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// What a derivative is of.
-    fn kind(&mut self, derivative: u32) -> Kind {
+    pub(super) fn kind(&mut self, derivative: u32) -> Kind {
         let stoichiometry = self.stoichiometry();
         match stoichiometry.rows.get(derivative as usize).cloned().flatten() {
             Some(row) if self.is_amount(self.derivatives[derivative as usize].state) => Kind::Matter(row),
@@ -453,11 +483,15 @@ impl Interpreter<'_, '_> {
     }
 
     /// Bounds that what moves never leaves: those that are known, of what has nothing to do with anything that has changed since.
-    fn barrier(&mut self, known: Option<&InvariantBox>, facts: &mut AbstractState) -> InvariantBox {
-        let kept = known.map(|known| self.unaffected(known, facts)).unwrap_or_default();
-        if let Some(known) = known.filter(|_| !kept.is_empty()) {
-            let ties =
-                known.ties.iter().filter(|(i, _)| kept.contains(i)).map(|(i, ties)| (*i, ties.clone())).collect();
+    fn barrier(&mut self, known: Option<InvariantBox>, facts: &mut AbstractState) -> InvariantBox {
+        let known = match known.map(|known| self.renewed(known, facts)) {
+            Some(Ok(renewed)) => return renewed,
+            Some(Err(known)) => Some(known),
+            None => None,
+        };
+        let ties = known.as_ref().map(|known| self.unaffected(known, facts)).unwrap_or_default();
+        let kept: BTreeSet<u32> = ties.keys().copied().collect();
+        if let Some(known) = known.as_ref().filter(|_| !kept.is_empty()) {
             let before = facts.clone();
             let found = self.enclosed(&kept, facts);
             // What began to move meanwhile may have to do with what was kept.
@@ -497,15 +531,7 @@ impl Interpreter<'_, '_> {
         due.extend(&facts.moving);
         due.retain(|i| !kept.contains(i));
         facts.rebind(Bonds::settle);
-        let mut box_ = Making {
-            within: facts.clone(),
-            whole: BTreeMap::new(),
-            active: BTreeSet::new(),
-            ways: BTreeMap::new(),
-            moving: BTreeSet::new(),
-            faces: 0,
-            together: Default::default(),
-        };
+        let mut box_ = Making::around(facts);
         // Faces that late sweeps cross are without bound from then on, and each flux starts once, so that this ends.
         let mut round = 0;
         while !due.is_empty() {
@@ -527,7 +553,8 @@ impl Interpreter<'_, '_> {
         if self.is_too_much(&box_) {
             self.say_unbounded();
         } else {
-            self.narrow(facts, &mut box_);
+            let walls = self.walls(&box_);
+            self.narrow(&walls, facts, &mut box_);
         }
         let (mut states, mut ties, mut rates) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
         for i in &box_.moving {
@@ -635,7 +662,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// Moves the faces of a state out that are crossed.
-    fn push_out(
+    pub(super) fn push_out(
         &mut self,
         derivative: u32,
         kind: &Kind,
@@ -769,7 +796,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// How fast a wall is crossed outwards where it has a value; not positive where it is not.
-    fn outwards(&mut self, wall: Wall, at: f64, side: f64, making: &mut Making) -> f64 {
+    pub(super) fn outwards(&mut self, wall: Wall, at: f64, side: f64, making: &mut Making) -> f64 {
         let (slow, fast) = self.rate_at(wall, at, making);
         if side > 0.0 { fast } else { -slow }
     }
@@ -790,11 +817,10 @@ impl Interpreter<'_, '_> {
     }
 
     /// Brings faces back in as far as nothing crosses them.
-    fn narrow(&mut self, facts: &AbstractState, making: &mut Making) {
-        let walls = self.walls(making);
+    pub(super) fn narrow(&mut self, walls: &[Wall], facts: &AbstractState, making: &mut Making) {
         for _ in 0..NARROWINGS {
             let mut rests = true;
-            for wall in &walls {
+            for wall in walls {
                 let (inner_low, inner_high) = self.begins(*wall, facts);
                 let (Wall::Whole(i) | Wall::Apart(i)) = *wall;
                 self.rate(i, &making.within);
@@ -819,7 +845,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// Whether the lower and the upper face of a wall are crossed outwards; the rate was evaluated just before.
-    fn crossings(&mut self, wall: Wall, making: &mut Making) -> (bool, bool) {
+    pub(super) fn crossings(&mut self, wall: Wall, making: &mut Making) -> (bool, bool) {
         let (Wall::Whole(i) | Wall::Apart(i)) = wall;
         let (low, high) = self.faces(wall, making);
         let still = self.still(self.derivatives[i as usize].state, &making.within);

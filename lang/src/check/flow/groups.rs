@@ -21,26 +21,26 @@ pub(super) struct Ties {
 }
 
 impl Interpreter<'_, '_> {
-    /// The derivatives whose bounds for all time to come still hold: they have nothing to do with any that may have changed since.
-    pub(super) fn unaffected(&mut self, known: &InvariantBox, facts: &AbstractState) -> BTreeSet<u32> {
+    /// The derivatives whose bounds for all time to come still hold, with what they have to do with others: nothing with any that may
+    /// have changed since.
+    pub(super) fn unaffected(&mut self, known: &InvariantBox, facts: &AbstractState) -> BTreeMap<u32, Rc<Ties>> {
+        let moved: BTreeMap<u32, u32> =
+            known.states.keys().filter_map(|state| Some((self.derivative_of(*state)?, *state))).collect();
         let mut changed = facts.unsettled.clone();
-        changed.extend(facts.moving.iter().filter(|i| !known.ties.contains_key(i)));
-        let outside = |i: &&u32| {
-            let state = self.derivatives[**i as usize].state;
-            let (low, high) = facts.states[state as usize].bounds();
-            known.states.get(&state).is_none_or(|(least, most)| !(least <= &low && &high <= most))
-        };
-        changed.extend(known.ties.keys().filter(outside));
+        changed.extend(facts.moving.iter().filter(|i| !moved.contains_key(i)));
+        changed.extend(moved.iter().filter(|(_, state)| !known.contains(**state, facts)).map(|(i, _)| *i));
         if let Some(bonds) = &facts.bonds {
             let states: Vec<u32> = bonds.loose(facts).collect();
             changed.extend(states.iter().filter_map(|state| self.derivative_of(*state)));
         }
-        let mut ties = known.ties.clone();
-        for i in &changed {
-            ties.insert(*i, Rc::new(self.ties(*i, facts)));
+        let mut ties = BTreeMap::new();
+        for i in changed.iter().chain(moved.keys()) {
+            let of = known.ties.get(i).filter(|_| !changed.contains(i)).cloned();
+            ties.insert(*i, of.unwrap_or_else(|| Rc::new(self.ties(*i, facts))));
         }
         let affected = together(&ties, &changed);
-        known.ties.keys().copied().filter(|i| facts.moving.contains(i) && !affected.contains(i)).collect()
+        ties.retain(|i, _| moved.contains_key(i) && facts.moving.contains(i) && !affected.contains(i));
+        ties
     }
 
     /// What a derivative has to do with others as things are.

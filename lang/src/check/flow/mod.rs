@@ -48,6 +48,7 @@ mod polytope;
 mod program_points;
 mod raced;
 mod reached;
+mod renewed;
 mod report;
 mod reported;
 mod state;

@@ -1,0 +1,172 @@
+//! Bounds for all time to come that stay where little has changed. A box that the laws keep needs another look only at the faces
+//! of what has changed: where these hold still, at the place where they would come to rest again, all others do, and what
+//! began to move is bounded within the box. Filling one of 384 wells on a block so costs what that well and the block take.
+
+use std::collections::BTreeSet;
+
+use super::Interpreter;
+use super::evolve::{AT_REST, InvariantBox, Kind, Making, Wall};
+use super::state::AbstractState;
+
+/// So many derivatives are looked at before a box is made anew.
+const MOST_LOOKS: usize = 64;
+
+/// A known box and what of it is found anew.
+struct Renewal<'f> {
+    facts: &'f AbstractState,
+    making: Making,
+    /// Derivatives that are bounded anew.
+    anew: BTreeSet<u32>,
+    /// Derivatives whose rates have to be bounded again.
+    redone: BTreeSet<u32>,
+}
+
+impl Interpreter<'_, '_> {
+    /// A known box with what has changed since; the box as it was where more of it would become another one, or where matter moves.
+    pub(super) fn renewed(
+        &mut self,
+        known: InvariantBox,
+        facts: &mut AbstractState,
+    ) -> Result<InvariantBox, InvariantBox> {
+        if facts.bonds.is_some() || known.bonds.is_some() || known.states.is_empty() {
+            return Err(known);
+        }
+        match self.renewal(&known, facts) {
+            None => Err(known),
+            Some((making, redone)) => Ok(self.renew(known, making, redone, facts)),
+        }
+    }
+
+    /// What of a known box becomes another one; none where that is not only what has changed.
+    fn renewal(&mut self, known: &InvariantBox, facts: &AbstractState) -> Option<(Making, BTreeSet<u32>)> {
+        let mut making = Making::around(facts);
+        let mut due = facts.unsettled.clone();
+        let mut anew: BTreeSet<u32> = due.union(&facts.moving).copied().collect();
+        for (state, faces) in &known.states {
+            let of = self.derivative_of(*state).filter(|of| facts.moving.contains(of))?;
+            if known.contains(*state, facts) {
+                anew.remove(&of);
+                making.take_over(of, *state, *faces);
+            } else {
+                anew.insert(of);
+            }
+        }
+        due.extend(&anew);
+        due.extend(anew.iter().flat_map(|i| self.rates_on(*i)));
+        let redone = due.clone();
+        let mut renewal = Renewal { facts, making, anew, redone };
+        let mut rounds = 0;
+        while let Some(i) = due.pop_first() {
+            rounds += 1;
+            if rounds > MOST_LOOKS {
+                return None;
+            }
+            due.extend(self.look_again(i, &mut renewal)?);
+        }
+        let Renewal { mut making, anew, mut redone, .. } = renewal;
+        let walls: Vec<Wall> = anew.intersection(&making.moving).map(|i| Wall::Whole(*i)).collect();
+        self.narrow(&walls, facts, &mut making);
+        redone.extend(anew.iter().flat_map(|i| self.rates_on(*i)));
+        Some((making, redone))
+    }
+
+    /// The derivatives that rest on the state of one.
+    fn rates_on(&self, i: u32) -> impl Iterator<Item = u32> {
+        self.rates_of.get(&self.derivatives[i as usize].state).into_iter().flatten().copied()
+    }
+
+    /// Looks at a derivative that has changed: what has to be looked at for it; none where more of the box becomes another one.
+    fn look_again(&mut self, i: u32, renewal: &mut Renewal) -> Option<BTreeSet<u32>> {
+        let mut crossed = BTreeSet::new();
+        let kind = self.kind(i);
+        if let Kind::Matter(row) = &kind {
+            return self.is_still(i, row, renewal).then_some(crossed);
+        }
+        if renewal.anew.contains(&i) {
+            self.push_out(i, &kind, false, renewal.facts, &mut renewal.making, &mut crossed);
+            // At once, so that no face pushes another one out that would come in again.
+            self.narrow(&[Wall::Whole(i)], renewal.facts, &mut renewal.making);
+            return Some(crossed);
+        }
+        let state = self.derivatives[i as usize].state;
+        if self.stops(i, renewal) {
+            renewal.making.within.states[state as usize] = renewal.facts.states[state as usize].clone();
+            renewal.making.moving.remove(&i);
+            renewal.anew.insert(i);
+            crossed.extend(self.rates_on(i));
+            return Some(crossed);
+        }
+        self.stands(i, renewal).then_some(crossed)
+    }
+
+    /// Whether none of the fluxes that change an amount goes on.
+    fn is_still(&mut self, i: u32, row: &super::fluxes::Row, renewal: &Renewal) -> bool {
+        let stoichiometry = self.stoichiometry();
+        let still = self.still(self.derivatives[i as usize].state, renewal.facts);
+        row.fluxes.iter().all(|(flux, c)| {
+            let (low, high) = self.flux(&stoichiometry.fluxes[*flux], &renewal.making.within);
+            (low * c).abs() <= still && (high * c).abs() <= still
+        })
+    }
+
+    /// Whether a state no longer moves from where it is.
+    fn stops(&mut self, i: u32, renewal: &mut Renewal) -> bool {
+        let state = self.derivatives[i as usize].state;
+        let still = self.still(state, renewal.facts);
+        let here = renewal.facts.states[state as usize].clone();
+        let before = std::mem::replace(&mut renewal.making.within.states[state as usize], here);
+        let (slow, fast) = self.rate(i, &renewal.making.within);
+        renewal.making.within.states[state as usize] = before;
+        slow.abs() <= still && fast.abs() <= still
+    }
+
+    /// Whether the faces of a state are where they would come to rest again.
+    fn stands(&mut self, i: u32, renewal: &mut Renewal) -> bool {
+        let wall = Wall::Whole(i);
+        let making = &mut renewal.making;
+        let (low, high) = self.faces(wall, making);
+        let begins = self.begins(wall, renewal.facts);
+        let (slow, fast) = self.rate(i, &making.within);
+        if self.crossings(wall, making) != (false, false) {
+            return false;
+        }
+        let state = self.derivatives[i as usize].state;
+        // A counter: nothing slows it down.
+        let counts = !self.parts(self.derivatives[i as usize].rate).states.contains(&state);
+        let slack = AT_REST * (high - low);
+        let mut rests = |near: f64, far: f64, side: f64| match far.is_finite() {
+            true if slack.is_finite() => {
+                (far - near).abs() <= slack || self.outwards(wall, far - side * slack, side, making) > 0.0
+            }
+            true => near == far,
+            false => counts && if side > 0.0 { fast > 0.0 } else { slow < 0.0 },
+        };
+        rests(begins.0, low, -1.0) && rests(begins.1, high, 1.0)
+    }
+
+    /// The known box with what has become of it.
+    fn renew(
+        &mut self,
+        mut known: InvariantBox,
+        making: Making,
+        redone: BTreeSet<u32>,
+        facts: &mut AbstractState,
+    ) -> InvariantBox {
+        for i in redone {
+            let derivative = &self.derivatives[i as usize];
+            known.ties.remove(&i);
+            if making.moving.contains(&i) {
+                let bounds = making.within.states[derivative.state as usize].bounds();
+                known.states.insert(derivative.state, bounds);
+                known.rates.insert(i, self.eval(derivative.rate, &making.within).bounds());
+            } else {
+                known.states.remove(&derivative.state);
+                known.rates.remove(&i);
+            }
+        }
+        facts.moving = making.moving;
+        facts.unsettled.clear();
+        known.veiled.clone_from(&self.veiled);
+        known
+    }
+}
