@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 use super::Interpreter;
 use super::evolve::{AT_REST, InvariantBox, Kind, Making, Wall};
+use super::fluxes::Row;
 use super::state::AbstractState;
 
 /// So many derivatives are looked at before a box is made anew.
@@ -17,8 +18,6 @@ struct Renewal<'f> {
     making: Making,
     /// Derivatives that are bounded anew.
     anew: BTreeSet<u32>,
-    /// Derivatives whose rates have to be bounded again.
-    redone: BTreeSet<u32>,
 }
 
 impl Interpreter<'_, '_> {
@@ -53,8 +52,11 @@ impl Interpreter<'_, '_> {
         }
         due.extend(&anew);
         due.extend(anew.iter().flat_map(|i| self.rates_on(*i)));
-        let redone = due.clone();
-        let mut renewal = Renewal { facts, making, anew, redone };
+        if due.len() > MOST_LOOKS {
+            return None;
+        }
+        let mut redone = due.clone();
+        let mut renewal = Renewal { facts, making, anew };
         let mut rounds = 0;
         while let Some(i) = due.pop_first() {
             rounds += 1;
@@ -63,7 +65,7 @@ impl Interpreter<'_, '_> {
             }
             due.extend(self.look_again(i, &mut renewal)?);
         }
-        let Renewal { mut making, anew, mut redone, .. } = renewal;
+        let Renewal { mut making, anew, .. } = renewal;
         let walls: Vec<Wall> = anew.intersection(&making.moving).map(|i| Wall::Whole(*i)).collect();
         self.narrow(&walls, facts, &mut making);
         redone.extend(anew.iter().flat_map(|i| self.rates_on(*i)));
@@ -100,7 +102,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// Whether none of the fluxes that change an amount goes on.
-    fn is_still(&mut self, i: u32, row: &super::fluxes::Row, renewal: &Renewal) -> bool {
+    fn is_still(&mut self, i: u32, row: &Row, renewal: &Renewal) -> bool {
         let stoichiometry = self.stoichiometry();
         let still = self.still(self.derivatives[i as usize].state, renewal.facts);
         row.fluxes.iter().all(|(flux, c)| {
@@ -165,8 +167,6 @@ impl Interpreter<'_, '_> {
             }
         }
         facts.moving = making.moving;
-        facts.unsettled.clear();
-        known.veiled.clone_from(&self.veiled);
         known
     }
 }
