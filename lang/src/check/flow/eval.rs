@@ -1,6 +1,5 @@
 //! Values of nodes from what is known.
 
-use std::collections::hash_map::Entry;
 use std::rc::Rc;
 
 use matterix_ir::equilibrium::Call;
@@ -334,28 +333,33 @@ impl Interpreter<'_, '_> {
                 return order;
             }
         }
-        // Operands have smaller numbers.
-        found.sort_unstable();
+        // Operands have smaller numbers. Runs that are in order stay so: a merge.
+        found.sort();
         found.dedup();
         found.into()
     }
 
     /// The operations of a node that depend on one of them, itself among them. They are found when they are asked for again.
     fn above(&mut self, node: NodeId, leaf: NodeId, order: &[NodeId]) -> Option<Rc<[NodeId]>> {
-        let lab = self.lab;
-        let find = || {
-            let mut on: FxHashSet<NodeId> = FxHashSet::default();
-            let depends = |n: &&NodeId| {
-                let is = **n == leaf || lab.graph.op(**n).operands().any(|a| on.contains(&a));
-                is && on.insert(**n)
-            };
-            order.iter().filter(depends).copied().collect::<Rc<[NodeId]>>()
-        };
-        match self.nodes.above.entry((node, leaf)) {
-            Entry::Occupied(mut known) => Some(known.get_mut().get_or_insert_with(find).clone()),
-            Entry::Vacant(place) => {
-                place.insert(None);
+        match self.nodes.above.get(&(node, leaf)) {
+            None => {
+                self.nodes.above.insert((node, leaf), None);
                 None
+            }
+            Some(Some(known)) => Some(known.clone()),
+            Some(None) => {
+                // Operands have smaller numbers: nothing before it depends on it.
+                let later = &order[order.partition_point(|n| *n < leaf)..];
+                let mut on = vec![false; (node.0 - leaf.0) as usize + 1];
+                let depends = |n: &&NodeId| {
+                    let is_on = |a: NodeId| a >= leaf && on[(a.0 - leaf.0) as usize];
+                    let is = **n == leaf || self.lab.graph.op(**n).operands().any(is_on);
+                    on[(n.0 - leaf.0) as usize] = is;
+                    is
+                };
+                let found: Rc<[NodeId]> = later.iter().filter(depends).copied().collect();
+                self.nodes.above.insert((node, leaf), Some(found.clone()));
+                Some(found)
             }
         }
     }

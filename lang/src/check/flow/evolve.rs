@@ -526,7 +526,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// Bounds of all that moves but for what is kept.
-    fn enclosed(&mut self, kept: &BTreeSet<u32>, facts: &mut AbstractState) -> InvariantBox {
+    pub(super) fn enclosed(&mut self, kept: &BTreeSet<u32>, facts: &mut AbstractState) -> InvariantBox {
         let mut due: BTreeSet<u32> = std::mem::take(&mut facts.unsettled);
         due.extend(&facts.moving);
         due.retain(|i| !kept.contains(i));
