@@ -47,7 +47,8 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
         let name = match args.target {
             pipeline::Target::OpentronsPython => "protocol.py",
             pipeline::Target::Urscript => "program.script",
-            _ => "protocol.json",
+            pipeline::Target::OpentronsJson => "protocol.json",
+            _ => return Err("no device plays a file of this target: `--play` takes `opentrons-json`, `opentrons-python` and `urscript`".to_owned()),
         };
         // Whatever became of it, the robot may have taken these tips.
         let played = super::play::play(&input, &options, bindings, (name, bytes), cancel, color)?;

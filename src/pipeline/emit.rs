@@ -17,6 +17,8 @@ pub enum Target {
     OpentronsJson,
     /// A protocol of Opentrons in Python.
     OpentronsPython,
+    /// A program for PyLabRobot.
+    Pylabrobot,
     /// Numbered steps to read.
     Commands,
     /// The same, one JSON object per line.
@@ -33,7 +35,7 @@ impl Target {
     /// The wire whose drivers say what devices are told.
     pub fn wire(self) -> &'static str {
         match self {
-            Target::OpentronsJson | Target::OpentronsPython => opentrons::WIRE,
+            Target::OpentronsJson | Target::OpentronsPython | Target::Pylabrobot => opentrons::WIRE,
             Target::Urscript => urscript::WIRE,
             _ => "",
         }
@@ -79,6 +81,7 @@ pub fn emit(
     let written = match target {
         Target::OpentronsJson => opentrons::json(subject, &performance),
         Target::OpentronsPython => opentrons::python(subject, &performance),
+        Target::Pylabrobot => opentrons::pylabrobot(subject, &performance),
         Target::Commands => steps::text(subject, &performance),
         Target::CommandsJson => steps::json(subject, &performance),
         Target::Urscript => urscript::script(subject, &performance),

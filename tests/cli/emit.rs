@@ -245,6 +245,73 @@ fn names_that_python_has_itself_are_not_taken() {
 }
 
 #[test]
+fn programs_for_pylabrobot_say_each_stroke_by_channel() {
+    let dir = folder("pylabrobot");
+    let text = |step: &str| {
+        format!(
+            "mtx 1
+use std::opentrons::{{Corning96, OT2, P300Multi, P20Single, Reservoir12, TemperatureModule, TipRack20, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P20Single, right: P300Multi }} at (0, 0, 0) m
+    deck = Corning96 on ot2.slot[1]
+    trough = Reservoir12 on ot2.slot[2] holding {{ A1: 10 mL of water }}
+    large = TipRack300 on ot2.slot[3]
+    small = TipRack20 on ot2.slot[4]
+    cold = TemperatureModule on ot2.slot[6]
+}}
+workflow go in deck {{
+    {step}
+}}\n"
+        )
+    };
+    let steps = "pick up tip large.column(2) by ot2.right
+    aspirate 100 uL from trough[A1] by ot2.right
+    dispense 60 uL into deck.column(3) by ot2.right at bottom + 2 mm { rate: 30 uL/s }
+    touch tip to deck.column(3) by ot2.right
+    blow out into deck.column(4) by ot2.right
+    return tip to large.column(2) by ot2.right
+    pick up tip from small by ot2.left
+    aspirate 5 uL from trough[A1] by ot2.left
+    move ot2.left to trough[A2]
+    air gap 2 uL by ot2.left
+    dispense 7 uL into deck[B5] by ot2.left
+    wait 3 s
+    drop tip by ot2.left";
+    write(&dir, "a.mtx", text(steps));
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "pylabrobot"]);
+    assert_eq!(emitted.code, 0, "{}", emitted.err);
+    let eight = |column: u32| "ABCDEFGH".chars().map(|row| format!("\"{row}{column}\"")).collect::<Vec<_>>().join(", ");
+    let channels = "[1, 2, 3, 4, 5, 6, 7, 8]";
+    for line in [
+        "CHANNELS = 9".to_owned(),
+        // The deck of PyLabRobot is called so.
+        "deck_2 = make_plate(\"deck_2\", (127.76, 85.47, 14.22), [".to_owned(),
+        "deck.assign_child_at_slot(deck_2, 1)".to_owned(),
+        format!("await lh.pick_up_tips(at(large, {}), use_channels={channels})", eight(2)),
+        format!("await aspirate(lh, at(trough, {}), {channels}, 100, height=1, rate=94)", ["\"A1\""; 8].join(", ")),
+        format!("await dispense(lh, at(deck_2, {}), {channels}, 60, height=2, rate=30)", eight(3)),
+        "await touch(lh, 1, at(deck_2, \"A3\")[0], height=9.67, radius=1)".to_owned(),
+        format!(
+            "await dispense(lh, at(deck_2, {}), {channels}, 40, height=10.67, rate=94, blow_out=BLOW_OUT)",
+            eight(4)
+        ),
+        format!("await lh.drop_tips(at(large, {}), use_channels={channels}, allow_nonzero_volume=True)", eight(2)),
+        "await aspirate(lh, at(trough, \"A2\"), [0], 2, height=26.85, rate=7.56)".to_owned(),
+        "await dispense(lh, at(deck_2, \"B5\"), [0], 7, height=10.67, rate=7.56)".to_owned(),
+        "await wait(lh, 3)".to_owned(),
+        "await lh.discard_tips(use_channels=[0], allow_nonzero_volume=True)".to_owned(),
+    ] {
+        assert!(emitted.out.contains(&line), "{line}: {}", emitted.out);
+    }
+    write(&dir, "a.mtx", text("heat cold to 10 degC { stays: true }"));
+    let refused = matterixc_in(&dir, &["emit", "a.mtx", "--target", "pylabrobot", "-o", "a.py"]);
+    assert_eq!((refused.code, dir.join("a.py").exists()), (1, false), "{}", refused.err);
+    let said = flat(&format!("{}{}", refused.out, refused.err));
+    assert!(said.contains("PyLabRobot has no call for `temperatureModule/setTargetTemperature`"), "{said}");
+}
+
+#[test]
 fn labware_of_ones_own_goes_along() {
     let dir = folder("emit_own");
     write(&dir, "plate.json", own_plate());

@@ -16,10 +16,16 @@ fn definition(category: &str, rows: usize, columns: usize, [depth, diameter, vol
         }
     }
     let ordering: Vec<Vec<String>> = (0..columns).map(|c| (0..rows).map(|r| name(r, c)).collect()).collect();
-    json!({ "metadata": { "displayCategory": category }, "parameters": { "isTiprack": category == "tipRack" }, "wells": wells, "ordering": ordering })
+    json!({
+        "schemaVersion": 2, "namespace": "opentrons", "metadata": { "displayCategory": category }, "wells": wells, "ordering": ordering,
+        "parameters": { "isTiprack": category == "tipRack", "tipLength": depth },
+        "dimensions": { "xDimension": 127.76, "yDimension": 85.48, "zDimension": 1.0 + depth },
+    })
 }
 
-fn load(id: &str, (load_name, version): (&str, u32), slot: &str, definition: Value) -> Value {
+fn load(id: &str, (load_name, version): (&str, u32), slot: &str, mut definition: Value) -> Value {
+    definition["version"] = version.into();
+    definition["parameters"]["loadName"] = load_name.into();
     json!({
         "commandType": "loadLabware",
         "params": { "location": { "slotName": slot }, "loadName": load_name, "namespace": "opentrons", "version": version, "displayName": id },
@@ -209,7 +215,7 @@ fn one_tip_on_a_pipette_with_eight_channels_works_in_single_wells() {
         "pick up tip tips[H1] by ot2.right",
         "aspirate 50 uL from stock[A1] by ot2.right",
         "dispense 50 uL into plate[C3] by ot2.right",
-        "stock = TubeRack24 on ot2.slot[3] holding { A1: 110 uL of water }",
+        "stock = TubeRack24 on ot2.slot[3] holding { A1: 100 uL of water }",
         "plate = Corning96 on ot2.slot[2] holding { A12 .. C12: 40 uL of water }",
         "pick up tip [tips[F2], tips[G2], tips[H2]] by ot2.right",
         "aspirate 40 uL from [plate[A12], plate[B12], plate[C12]] by ot2.right",
@@ -242,7 +248,7 @@ fn what_is_aspirated_at_the_rim_is_air() {
     steps.insert(2, at("aspirate", "stock", "A1", 0.0, json!({ "volume": 5.0, "flowRate": 92.86 })));
     let (text, _) = imported("at_the_rim", steps);
     assert!(text.contains("air gap 5 uL by ot2.left"), "{text}");
-    assert!(text.contains("holding { A1: 469 uL of water }"), "{text}");
+    assert!(text.contains("holding { A1: 405 uL of water }"), "{text}");
 }
 
 #[test]
@@ -465,11 +471,11 @@ workflow go in deck {{
 }}\n"
         )
     };
-    // 100 uL stand 2.7 mm high in a flat well of 6.86 mm; the rim is 10.67 mm above the bottom, whatever the workflow calls top.
+    // 100 uL stand 3.1 mm high in this well; the rim is 10.67 mm above the bottom, whatever the workflow calls top.
     let cases = [
         ("aspirate 20 uL from plate[A1] by ot2.left at surface - 1 mm", "no findings"),
         ("aspirate 20 uL from plate[A1] by ot2.left at bottom + 2.6 mm", "no findings"),
-        ("aspirate 20 uL from plate[A1] by ot2.left at bottom + 2.8 mm", "above-liquid"),
+        ("aspirate 20 uL from plate[A1] by ot2.left at bottom + 3.3 mm", "above-liquid"),
         ("aspirate 20 uL from plate[A1] by ot2.left at top - 1 mm", "9.67 mm above the bottom"),
         ("aspirate 20 uL from plate[A1] by ot2.left at top + 1 mm", "outside-well"),
         ("aspirate 20 uL at bottom - 1 mm from plate[A1] by ot2.left", "outside-well"),
@@ -480,6 +486,66 @@ workflow go in deck {{
         write(&dir, "a.mtx", text(line));
         let checked = matterixc_in(&dir, &["check", "a.mtx"]);
         assert!(flat(&checked.out).contains(why), "{line}: {}", checked.out);
+    }
+}
+
+#[test]
+fn what_a_tip_does_not_reach_stays_in_the_well() {
+    let dir = folder("reach");
+    let text = |wells: &str, line: &str, expected: &str| {
+        format!(
+            "mtx 1\nuse std::opentrons::{{Corning96, OT2, P300Multi, P300Single, Reservoir1, TipRack300}}
+lab deck {{
+    ambient: 25 degC
+    ot2 = OT2 {{ left: P300Single, right: P300Multi }} at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[1]
+    plate = Corning96 on ot2.slot[3] holding {{ {wells} }}
+    trough = Reservoir1 on ot2.slot[4] holding {{ A1: 40 mL of water }}
+}}
+workflow go in deck {{
+    {line}
+    expect {expected}
+}}\n"
+        )
+    };
+    // A well is 6.35 mm wide at the bottom and 6.86 mm at the rim, 10.67 mm above it: so much is in its lowest 1.6 mm.
+    let wide = |height: f64| 3.175 + 0.255 * height / 10.67;
+    let below = std::f64::consts::PI / 3.0 * 1.6 * (wide(0.0).powi(2) + wide(0.0) * wide(1.6) + wide(1.6).powi(2));
+    let single = |step: &str| {
+        let (step, options) =
+            step.split_once(" { ").map_or((step, String::new()), |(step, rest)| (step, format!(" {{ {rest}")));
+        format!(
+            "pick up tip from tips by ot2.left\n{step} by ot2.left{options}\ndispense 60 uL into plate[B1] by ot2.left\ndrop tip by ot2.left"
+        )
+    };
+    let column = |step: &str| {
+        format!(
+            "pick up tip tips.column(2) by ot2.right\n{step} by ot2.right\ndispense 60 uL into plate.column(2) by ot2.right\ndrop tip by ot2.right"
+        )
+    };
+    let near = |well: &str, volume: f64| format!("abs(plate[{well}].contents.volume - {volume} uL) <= 1 uL");
+    let cases = [
+        (single("aspirate 60 uL from plate[A1] at bottom + 1 mm"), near("B1", 60.0), false),
+        (single("aspirate 60 uL from plate[A1] at bottom + 2 mm"), near("B1", 60.0), false),
+        // All but the lowest 1.6 mm.
+        (single("aspirate 60 uL from plate[A1] at bottom + 2.6 mm"), near("B1", 100.0 - below), true),
+        (single("aspirate 60 uL from plate[A1] at bottom + 5 mm"), near("B1", 0.0), true),
+        // Of the 60 uL that come out first 60 are air.
+        (single("aspirate 108 uL from plate[A1] at bottom + 2.6 mm { partial: true }"), near("B1", 0.0), true),
+        (single("aspirate 120 uL from plate[A1] at bottom + 5 mm { partial: true }"), near("A1", 100.0), true),
+        (column("aspirate 60 uL from trough[A1] at bottom + 2 mm"), near("H2", 60.0), false),
+        // A trough of 106.8 mm x 71.2 mm: they share what lies in its uppermost 0.05 mm.
+        (column("aspirate 60 uL from trough[A1] at surface + 0.95 mm"), near("A2", 47.5), true),
+        (column("aspirate 60 uL from trough[A1] at surface + 0.95 mm"), near("H2", 47.5), true),
+        (column("aspirate 60 uL from trough[A1] at surface + 1.1 mm"), near("A2", 0.0), true),
+    ];
+    for (steps, expected, warned) in cases {
+        write(&dir, "a.mtx", text("A1: 100 uL of water", &steps, &expected));
+        let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+        assert_eq!(checked.code, 0, "{steps} {expected}: {}", checked.out);
+        assert_eq!(checked.out.contains("above-liquid"), warned, "{steps}: {}", checked.out);
+        let ran = matterixc_in(&dir, &["run", "a.mtx"]);
+        assert_eq!(ran.code, 0, "{steps} {expected}: {}{}", ran.out, ran.err);
     }
 }
 
@@ -801,11 +867,18 @@ fn a_tip_that_the_liquid_leaves_behind_is_told() {
         flat(&matterixc_in(&dir, &["check", "a.mtx", "--no-cache"]).out)
     };
     let falls = said(80, "2 mm", "");
-    assert!(falls.contains("falls below the tip, which is 2 mm above the bottom: only 35.7 uL of 80 uL"), "{falls}");
+    assert!(
+        falls.contains(
+            "2 mm above the bottom of `plate[H1]` takes 68.1 uL of its 100 uL, and air for the rest of 80 uL"
+        ),
+        "{falls}"
+    );
     assert!(said(50, "1 mm", "").contains("no findings"));
     for options in ["", "{ partial: true }"] {
-        assert!(said(80, "5 mm", options).contains("it aspirates air"), "{options}");
+        assert!(said(80, "5 mm", options).contains("takes 0 uL of its 100 uL"), "{options}");
     }
+    let beside = said(20, "3.3 mm", "");
+    assert!(beside.contains("stand only 3.1 mm high: it may aspirate air"), "{beside}");
 }
 
 #[test]

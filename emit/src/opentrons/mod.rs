@@ -1,4 +1,4 @@
-//! Protocols of Opentrons, as JSON of schema 8 and as Python.
+//! Protocols of Opentrons, as JSON of schema 8 and as Python; the same as a program for PyLabRobot.
 
 mod deck;
 mod form;
@@ -6,6 +6,7 @@ mod json;
 mod liquids;
 mod message;
 mod protocol;
+mod pylabrobot;
 mod python;
 mod writer;
 
@@ -39,6 +40,12 @@ pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
 pub fn python(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let (protocol, warnings) = protocol(subject, performance)?;
     Ok((python::write(&protocol)?, warnings))
+}
+
+/// A program for PyLabRobot.
+pub fn pylabrobot(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
+    let (protocol, warnings) = protocol(subject, performance)?;
+    Ok((pylabrobot::write(&protocol)?, warnings))
 }
 
 fn protocol<'p>(

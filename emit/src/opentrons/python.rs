@@ -86,12 +86,12 @@ struct Script {
 }
 
 /// A text as a literal of Python: JSON's escapes are among Python's.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     Value::from(text).to_string()
 }
 
 /// A number as Python writes it.
-fn shown(value: Option<&Value>) -> String {
+pub(super) fn shown(value: Option<&Value>) -> String {
     match value.and_then(Value::as_f64) {
         Some(v) if v.fract() == 0.0 && v.abs() < 1e15 => format!("{v:.0}"),
         Some(v) => v.to_string(),

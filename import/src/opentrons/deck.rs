@@ -1,12 +1,13 @@
 //! What stands on the deck: names for it, and what of its definitions a protocol needs.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::PI;
 
+use matterix_lang::labware::{self, Insides};
 use serde_json::Value;
 
 use super::analysis::{Analysis, Command};
 use super::library::{Library, Pipette};
+use super::liquids::Reach;
 use super::node::{At, Place, cell};
 use super::words;
 
@@ -19,6 +20,9 @@ const CENTRED: &str = "centerMultichannelOnWells";
 /// How analyses call what stands anywhere but on the deck, and what the language calls that place.
 pub(super) const OFF: &str = "offDeck";
 pub(super) const ASIDE: &str = "aside";
+
+/// How far below its end a tip still takes up liquid, mm, as `suction` of the library has it.
+const SUCTION: f64 = 1.0;
 
 /// How far apart channels are, mm.
 const PITCH: f64 = 9.0;
@@ -35,15 +39,6 @@ pub(super) enum Kind {
 enum Opening {
     Round(f64),
     Square([f64; 2]),
-}
-
-impl Opening {
-    fn area(self) -> f64 {
-        match self {
-            Opening::Round(diameter) => PI * diameter * diameter / 4.0,
-            Opening::Square([wide, deep]) => wide * deep,
-        }
-    }
 }
 
 /// A well as its definition has it, mm.
@@ -79,6 +74,7 @@ pub(super) struct Labware {
     /// Where it comes as it is loaded, if it does not stand there from the start.
     pub(super) comes: Option<String>,
     pub(super) wells: BTreeMap<String, Well>,
+    insides: Insides,
     /// Wells in the order of columns.
     pub(super) order: Vec<String>,
     /// Whether the middle of all channels goes to the middle of a well, and not the first channel.
@@ -201,11 +197,13 @@ impl Deck {
         let label = command.text("displayName");
         let name = words::name_of(label, category_word(category), &mut self.names);
         let (wells, order) = (wells(definition), order(definition));
+        // What cannot be read is said where the asset is.
+        let insides = labware::insides(definition.clone()).unwrap_or_default();
         let id = command.loaded("labwareId").unwrap_or(load_name).to_owned();
         self.loaded.push(id.clone());
         let quirks = definition["parameters"]["quirks"].as_array();
         let is_centred = quirks.is_some_and(|quirks| quirks.iter().any(|quirk| quirk == CENTRED));
-        self.labware.insert(id, Labware { name, asset, kind, on, comes, wells, order, is_centred });
+        self.labware.insert(id, Labware { name, asset, kind, on, comes, wells, insides, order, is_centred });
         Ok(())
     }
 
@@ -276,10 +274,11 @@ impl Deck {
         self.named(labware).and_then(|labware| labware.wells.get(well)).map_or(0.0, |well| well.capacity)
     }
 
-    /// What the first well of a place holds up to a height, uL: as if it were as wide as its opening, and no more than it takes.
-    pub(super) fn held_below(&self, place: &Place, height: f64) -> f64 {
-        let well = self.wells_of(place).first().and_then(|name| self.named(&place.of)?.wells.get(name));
-        well.map_or(0.0, |well| (well.opening.area() * height.max(0.0)).min(well.capacity))
+    /// What a tip at a height of a place finds there and leaves behind: that of the first well.
+    pub(super) fn reach(&self, place: &Place, height: f64) -> Reach {
+        let well = self.wells_of(place).into_iter().next();
+        let of = |height: f64| Some(self.named(&place.of)?.insides.below(well.as_ref()?, height)?);
+        Reach { below: of(height).unwrap_or(0.0), left: of(height - SUCTION).unwrap_or(0.0) }
     }
 
     /// Wells of a place.

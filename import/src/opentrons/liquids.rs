@@ -11,6 +11,15 @@ pub(super) type Holdings = BTreeMap<Name, f64>;
 /// What wells hold at the start: volume in uL, and what of.
 pub(super) type Holding = BTreeMap<Name, (f64, String)>;
 
+/// What a tip at a height finds in a well, uL.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reach {
+    /// What the well holds up to that height.
+    pub(super) below: f64,
+    /// What the tip leaves there however much it draws.
+    pub(super) left: f64,
+}
+
 /// A well, uL.
 #[derive(Clone, Copy, Debug, Default)]
 struct Well {
@@ -37,6 +46,8 @@ struct Tips {
     drawn: f64,
     /// Air at the end, which comes out first.
     air: f64,
+    /// Air behind the liquid, which comes out last.
+    behind: f64,
 }
 
 /// What is in wells, beyond what was there at the start, and in tips.
@@ -65,16 +76,17 @@ impl Liquids {
         self.tips.get(pipette).is_some_and(|tips| tips.liquid.iter().any(|liquid| *liquid > 0.0))
     }
 
-    /// Each tip aspirates so much, at a height up to which a well holds `below`; whether the wells hold less.
+    /// Each tip aspirates so much, as far as it reaches; whether the wells hold less.
     pub(super) fn aspirate(
         &mut self,
         pipette: &str,
         volume: f64,
-        (channels, below): (usize, f64),
+        (channels, reach): (usize, Reach),
         labware: &str,
         wells: &[String],
     ) -> bool {
-        let each = volume * channels as f64 / wells.len().max(1) as f64;
+        let share = wells.len() as f64 / channels as f64;
+        let each = volume / share;
         let (mut taken, mut lacks) = (Vec::new(), false);
         for well in wells {
             let name = (labware.to_owned(), well.clone());
@@ -82,23 +94,23 @@ impl Liquids {
             let is_new = !self.wells.contains_key(&name);
             let well = self.wells.entry(name).or_default();
             well.is_source |= is_new;
-            well.wet = well.wet.max(below - well.net);
+            well.wet = well.wet.max(reach.below - well.net).max(reach.left + each - well.net);
             // What rounding left counts as there.
-            let there = initial.map_or(each, |initial| (initial + well.net) * (1.0 + 1e-9));
-            let here = each.min(there.max(0.0));
-            lacks |= here < each;
+            let there = initial.map_or(f64::INFINITY, |initial| (initial + well.net) * (1.0 + 1e-9));
+            lacks |= there < each;
+            let here = each.min((there - reach.left).max(0.0));
             taken.push(here);
             well.net -= here;
             well.least = well.least.min(well.net);
         }
         let tips = self.tips.entry(pipette.to_owned()).or_default();
         tips.liquid.resize(channels.max(tips.liquid.len()), 0.0);
-        let share = wells.len() as f64 / channels as f64;
         for (channel, liquid) in tips.liquid.iter_mut().enumerate().take(channels) {
             *liquid += taken.get(of(channel, wells)).map_or(0.0, |taken| taken * share);
         }
         tips.drawn += volume;
-        tips.air = 0.0;
+        tips.behind += tips.air;
+        tips.air = (volume - share * taken.iter().fold(0.0, |most: f64, taken| most.max(*taken))).max(0.0);
         lacks
     }
 
@@ -112,10 +124,11 @@ impl Liquids {
     /// Each tip dispenses so much: the air at its end first, then the same share of all that it holds, as `dispense` of the library does.
     pub(super) fn dispense(&mut self, pipette: &str, volume: f64, labware: &str, wells: &[String]) {
         let tips = self.tips.entry(pipette.to_owned()).or_default();
-        let (stroke, whole) = ((volume - tips.air).max(0.0), tips.drawn - tips.air);
+        let (stroke, whole) = ((volume - tips.air).max(0.0), tips.drawn - tips.air - tips.behind);
         let share = if stroke * (1.0 + 1e-9) >= whole { 1.0 } else { stroke / whole };
         let given: Vec<f64> = tips.liquid.iter().map(|liquid| liquid * share).collect();
         tips.liquid.iter_mut().zip(&given).for_each(|(liquid, given)| *liquid -= given);
+        tips.behind = tips.behind.min((tips.drawn - volume - (tips.air - volume).max(0.0)).max(0.0));
         tips.drawn = (tips.drawn - volume).max(0.0);
         tips.air = (tips.air - volume).max(0.0);
         self.fill(labware, wells, &given);
@@ -164,15 +177,20 @@ mod tests {
         vec![name.to_owned()]
     }
 
+    /// Up to a height the well holds so much, and all of it can be taken from there.
+    fn at(below: f64) -> Reach {
+        Reach { below, left: 0.0 }
+    }
+
     #[test]
     fn a_source_must_hold_what_leaves_it() {
         let mut liquids = Liquids::default();
-        liquids.aspirate("p", 50.0, (1, 10.0), "plate", &well("A1"));
+        liquids.aspirate("p", 50.0, (1, at(10.0)), "plate", &well("A1"));
         liquids.air("p", 10.0);
         liquids.dispense("p", 60.0, "plate", &well("B1"));
         // More than there is: the rest is air.
-        liquids.aspirate("p", 70.0, (1, 75.5), "plate", &well("B1"));
-        liquids.aspirate("p", 1.0, (1, 75.5), "plate", &well("C1"));
+        liquids.aspirate("p", 70.0, (1, at(75.5)), "plate", &well("B1"));
+        liquids.aspirate("p", 1.0, (1, at(75.5)), "plate", &well("C1"));
         let needed = |capacity: f64| -> Vec<(String, f64)> {
             liquids.needed(|_| capacity).into_iter().map(|((_, well), v)| (well, v)).collect()
         };
@@ -182,7 +200,7 @@ mod tests {
         let needed: Vec<f64> = liquids.needed(|_| 100.0).into_values().collect();
         assert_eq!(needed, [50.0, 30.0]);
         // No more room than that, even if all of it leaves in the end.
-        liquids.aspirate("p", 130.0, (1, 0.0), "plate", &well("C1"));
+        liquids.aspirate("p", 130.0, (1, at(0.0)), "plate", &well("C1"));
         let needed: Vec<f64> = liquids.needed(|_| 100.0).into_values().collect();
         assert_eq!(needed, [50.0, 30.0]);
     }
@@ -191,10 +209,10 @@ mod tests {
     fn what_lacks_is_air() {
         let initial = BTreeMap::from([(("plate".to_owned(), "A1".to_owned()), 100.0)]);
         let mut liquids = Liquids::with(initial);
-        assert!(!liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
-        assert!(liquids.aspirate("p", 60.0, (1, 0.0), "plate", &well("A1")));
+        assert!(!liquids.aspirate("p", 60.0, (1, at(0.0)), "plate", &well("A1")));
+        assert!(liquids.aspirate("p", 60.0, (1, at(0.0)), "plate", &well("A1")));
         liquids.dispense("p", 120.0, "plate", &well("B1"));
-        assert!(!liquids.aspirate("p", 100.0, (1, 0.0), "plate", &well("B1")));
+        assert!(!liquids.aspirate("p", 100.0, (1, at(0.0)), "plate", &well("B1")));
     }
 
     #[test]
@@ -204,16 +222,31 @@ mod tests {
         let column = ["A1", "B1"].map(str::to_owned);
         for _ in 0..3 {
             // Mixed in place, the first well never holds more than its own.
-            assert!(liquids.aspirate("p", 20.0, (2, 0.0), "plate", &column));
+            assert!(liquids.aspirate("p", 20.0, (2, at(0.0)), "plate", &column));
             liquids.dispense("p", 20.0, "plate", &column);
         }
-        assert!(!liquids.aspirate("p", 5.0, (2, 0.0), "plate", &column));
+        assert!(!liquids.aspirate("p", 5.0, (2, at(0.0)), "plate", &column));
+    }
+
+    #[test]
+    fn what_is_not_reached_is_air() {
+        let initial = BTreeMap::from([(("plate".to_owned(), "A1".to_owned()), 100.0)]);
+        let mut liquids = Liquids::with(initial);
+        // 40 uL and 20 uL of air, which comes out first.
+        let high = Reach { below: 80.0, left: 60.0 };
+        assert!(!liquids.aspirate("p", 60.0, (1, high), "plate", &well("A1")));
+        liquids.dispense("p", 30.0, "plate", &well("B1"));
+        assert!(liquids.aspirate("p", 11.0, (1, at(0.0)), "plate", &well("B1")));
+        let mut liquids = Liquids::default();
+        liquids.aspirate("p", 60.0, (1, high), "plate", &well("A1"));
+        let needed: Vec<f64> = liquids.needed(|_| 1000.0).into_values().collect();
+        assert_eq!(needed, [120.0]);
     }
 
     #[test]
     fn channels_share_a_trough() {
         let mut liquids = Liquids::default();
-        liquids.aspirate("p", 10.0, (8, 0.0), "trough", &well("A1"));
+        liquids.aspirate("p", 10.0, (8, at(0.0)), "trough", &well("A1"));
         liquids.dispense("p", 10.0, "waste", &well("A1"));
         let needed: Vec<f64> = liquids.needed(|_| 1000.0).into_values().collect();
         assert_eq!(needed, [80.0]);

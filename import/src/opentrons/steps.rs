@@ -333,8 +333,8 @@ impl<'a> Steps<'a> {
             }
             return self.air_gap(command, &by);
         }
-        let below = self.deck.held_below(&spot.place, spot.above + spot.depth);
-        let (how, wells) = ((self.channels(command)?, below), self.deck.wells_of(&spot.place));
+        let reach = self.deck.reach(&spot.place, spot.above + spot.depth);
+        let (how, wells) = ((self.channels(command)?, reach), self.deck.wells_of(&spot.place));
         let lacks = self.liquids.aspirate(id, command.volume(), how, &spot.place.of, &wells);
         let more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
         let options = self.options(command, Some(Flow::In), &more);

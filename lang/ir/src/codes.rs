@@ -149,7 +149,7 @@ codes! {
     NO_SAFE "no-safe" "N0" "a driver has no `safe` line, but its device can be left on";
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a volume below the smallest volume of a pipette";
-    ABOVE_LIQUID "above-liquid" "V3" "a tip aspirates above the surface of the liquid";
+    ABOVE_LIQUID "above-liquid" "V3" "a tip does not reach all the liquid that it aspirates";
     BEADS_NOT_HELD "beads-not-held" "V3" "a pipette takes beads along, as the magnets under the well are down";
     BEADS_NOT_GATHERED "beads-not-gathered" "V3" "a pipette takes liquid before the beads have gathered at the magnets";
     OUTSIDE_WELL "outside-well" "V3" "a height outside of the well";

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use matterix_ir::{filling, scene};
+
 use super::profile::Profile;
 use crate::eval::lab::grids::Place;
 
@@ -54,6 +56,18 @@ pub(super) struct Well {
     pub(super) shape: Shape,
     /// How far the end of a tip is below the nozzle that has it.
     pub(super) reach: Option<f64>,
+}
+
+impl Well {
+    /// Radius and height along its inside, mm: straight where only its opening is known.
+    pub(super) fn inner_wall(&self) -> Option<Vec<[f64; 2]>> {
+        match (&self.inside, self.opening) {
+            (Some(inside), _) => Some(inside.points().to_vec()),
+            (None, Some(Opening::Round(diameter))) => filling::inside(&scene::Shape::Cylinder([diameter, self.depth])),
+            (None, Some(Opening::Square([x, y]))) => filling::inside(&scene::Shape::Box([x, y, self.depth])),
+            (None, None) => None,
+        }
+    }
 }
 
 /// The shape of an opening.

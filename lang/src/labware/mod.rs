@@ -12,6 +12,10 @@ mod opentrons;
 mod profile;
 mod pylabrobot;
 
+use std::collections::BTreeMap;
+
+use matterix_ir::filling;
+
 use crate::ast::{AssetLine, Name, Path};
 
 use definition::Definition;
@@ -29,6 +33,23 @@ pub(crate) fn lines(text: &str, path: &Name) -> Result<(Vec<AssetLine>, Option<P
 fn read(text: &str) -> Result<(Definition, bool), String> {
     let value: serde_json::Value = serde_json::from_str(text).map_err(|e| format!("it is not JSON ({e})"))?;
     if pylabrobot::is_one(&value) { Ok((pylabrobot::read(value)?, false)) } else { Ok((opentrons::read(value)?, true)) }
+}
+
+/// The insides of wells, as an asset that comes from their definition has them: by name, radius and height along the wall, mm.
+#[derive(Clone, Debug, Default)]
+pub struct Insides(BTreeMap<String, Vec<[f64; 2]>>);
+
+impl Insides {
+    /// What a well holds up to a height above the lowest point of its inside, mm: µL; none where the inside is not known.
+    pub fn below(&self, well: &str, height: f64) -> Option<f64> {
+        self.0.get(well).map(|inside| filling::below(inside, height.max(0.0)))
+    }
+}
+
+/// The insides of the wells of a definition, or what is wrong with it.
+pub fn insides(definition: serde_json::Value) -> Result<Insides, String> {
+    let wells = opentrons::read(definition)?.wells;
+    Ok(Insides(wells.into_iter().filter_map(|(name, well)| Some((name, well.inner_wall()?))).collect()))
 }
 
 /// Labware in short.
