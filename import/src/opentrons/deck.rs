@@ -277,7 +277,7 @@ impl Deck {
     /// What a tip at a height of a place finds there and leaves behind: that of the first well.
     pub(super) fn reach(&self, place: &Place, height: f64) -> Reach {
         let well = self.wells_of(place).into_iter().next();
-        let of = |height: f64| Some(self.named(&place.of)?.insides.below(well.as_ref()?, height)?);
+        let of = |height: f64| self.named(&place.of)?.insides.below(well.as_ref()?, height);
         Reach { below: of(height).unwrap_or(0.0), left: of(height - SUCTION).unwrap_or(0.0) }
     }
 
