@@ -13,7 +13,7 @@ from pylabrobot.liquid_handling.backends import LiquidHandlerChatterboxBackend, 
 from pylabrobot.resources import Coordinate, CrossSectionType, Plate, Tip, TipRack, TipSpot, Well
 from pylabrobot.resources.opentrons import OTDeck
 
-# Air that follows the last of the liquid, uL: PyLabRobot asks for a volume.
+# Air that follows the last of the liquid, uL: PyLabRobot asks for a volume. On an OT-2 it blows out none.
 BLOW_OUT = 5
 
 # How high channels travel, mm.
@@ -80,6 +80,7 @@ async def dispense(lh, wells, channels, volume, height, x=0, y=0, rate=None, blo
 
 def stroke(wells, channels, volume, height, x, y, rate):
     n = len(channels)
+    height = wells[0].get_size_z() if height is None else height
     return {
         "vols": [float(volume)] * n,
         "use_channels": channels,
@@ -90,8 +91,13 @@ def stroke(wells, channels, volume, height, x, y, rate):
 
 
 async def move(lh, channel, place, height, x=0, y=0):
-    """A channel goes to a height above the bottom of a place."""
-    await move_to(lh, channel, place.get_location_wrt(lh.deck, "c", "c", "cavity_bottom") + Coordinate(x, y, height))
+    """A channel goes to a height above the bottom of a place; without one to its rim."""
+    await move_to(lh, channel, bottom(lh, place) + Coordinate(x, y, place.get_size_z() if height is None else height))
+
+
+def bottom(lh, place):
+    """The lowest point of the inside of a place, in its middle."""
+    return place.get_location_wrt(lh.deck, "c", "c", "b" if isinstance(place, TipSpot) else "cavity_bottom")
 
 
 async def move_to(lh, channel, there, straight=False):
@@ -108,7 +114,7 @@ async def move_to(lh, channel, there, straight=False):
 
 async def touch(lh, channel, place, height, radius=1):
     """A channel touches the wall of a place on four sides."""
-    middle = place.get_location_wrt(lh.deck, "c", "c", "cavity_bottom") + Coordinate(0, 0, height)
+    middle = bottom(lh, place) + Coordinate(0, 0, height)
     wide, long = radius * place.get_size_x() / 2, radius * place.get_size_y() / 2
     await move_to(lh, channel, middle)
     for x, y in ((wide, 0), (-wide, 0), (0, long), (0, -long), (0, 0)):

@@ -34,6 +34,7 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
         definitions,
         pipettes: BTreeMap::new(),
         labware: BTreeMap::new(),
+        names: BTreeMap::new(),
         slots: BTreeMap::new(),
         tips: BTreeSet::new(),
         loads: String::new(),
@@ -76,6 +77,8 @@ fn no_call(command: &Command, why: &str) -> Diagnostic {
 /// A pipette.
 #[derive(Debug, Default)]
 struct Pipette {
+    /// What Opentrons calls its model.
+    model: String,
     /// Its channels, from the back.
     channels: Vec<usize>,
     /// How many of them carry tips.
@@ -91,7 +94,8 @@ struct Pipette {
 /// Where in a well, mm: above the lowest point of its inside, to the right and to the back of its middle.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spot {
-    z: f64,
+    /// None at the rim of the bin, whose depth PyLabRobot knows.
+    z: Option<f64>,
     x: f64,
     y: f64,
 }
@@ -101,12 +105,21 @@ struct Script<'p> {
     pipettes: BTreeMap<String, Pipette>,
     /// The definition of what was loaded.
     labware: BTreeMap<String, &'p Value>,
+    /// What the lab calls it.
+    names: BTreeMap<String, String>,
     /// In which slot it stands.
     slots: BTreeMap<String, String>,
     /// Tips that are not in their places.
     tips: BTreeSet<(String, String)>,
     loads: String,
     steps: String,
+}
+
+impl Spot {
+    /// The height as an argument.
+    fn height(self) -> String {
+        self.z.map_or("None".to_owned(), |z| z.to_string())
+    }
 }
 
 impl<'p> Script<'p> {
@@ -120,8 +133,12 @@ impl<'p> Script<'p> {
             "loadPipette" => {
                 let first: usize = self.pipettes.values().map(|pipette| pipette.channels.len()).sum();
                 let count = if text("pipetteName").contains("multi") { 8 } else { 1 };
+                let model = text("pipetteName").to_owned();
+                if self.pipettes.values().any(|other| other.model == model) {
+                    return Err(no_call(command, "it takes the left one of two pipettes of the same model"));
+                }
                 let channels = (first..first + count).collect();
-                self.pipettes.insert(text("pipetteId").to_owned(), Pipette { channels, ..Pipette::default() });
+                self.pipettes.insert(text("pipetteId").to_owned(), Pipette { model, channels, ..Pipette::default() });
             }
             "loadLabware" => {
                 let uri =
@@ -137,6 +154,7 @@ impl<'p> Script<'p> {
                 let made = resource(&id, definition);
                 let _ = writeln!(self.loads, "    {id} = {made}\n    deck.assign_child_at_slot({id}, {slot})");
                 self.labware.insert(id.clone(), definition);
+                self.names.insert(id.clone(), text("displayName").to_owned());
                 self.slots.insert(id, slot.to_owned());
             }
             // Nothing stands on it, and nothing is said to it, or that is refused.
@@ -173,7 +191,8 @@ impl<'p> Script<'p> {
 
     /// Where a command is done.
     fn spot(&self, command: &Command) -> Spot {
-        let Some(location) = command.params.get("wellLocation") else { return Spot::default() };
+        let location = command.params.get("wellLocation").filter(|_| command.text("labwareId") != BIN);
+        let Some(location) = location else { return Spot::default() };
         let [x, y, z] = ["x", "y", "z"].map(|axis| location["offset"][axis].as_f64().unwrap_or(0.0));
         let well = self.labware.get(command.text("labwareId")).map(|d| &d["wells"][command.text("wellName")]);
         let depth = well.and_then(|well| well["depth"].as_f64()).unwrap_or(0.0);
@@ -183,12 +202,15 @@ impl<'p> Script<'p> {
             _ => depth,
         };
         // To the micrometre: what is left of a sum of decimals is none of the user's.
-        Spot { z: ((from + z) * 1e3).round() / 1e3, x, y }
+        Spot { z: Some(((from + z) * 1e3).round() / 1e3), x, y }
     }
 
     /// What a step does with liquid at a place.
     fn pass(&mut self, call: &str, command: &Command, volume: f64, more: &str) -> Result<(), Diagnostic> {
         let name = command.text("pipetteId").to_owned();
+        if self.pipettes.iter().any(|(other, pipette)| *other != name && pipette.tips > 0) {
+            return Err(no_call(command, "both pipettes carry tips, and it chooses between them by the volume"));
+        }
         let spot = self.spot(command);
         let labware = command.text("labwareId").to_owned();
         let channels = self.pipettes.get(&name).map_or(1, |pipette| pipette.channels.len());
@@ -221,7 +243,8 @@ impl<'p> Script<'p> {
             (0.0, 0.0) => String::new(),
             (x, y) => format!(", x={x}, y={y}"),
         };
-        let line = format!("await {call}(lh, {places}, {used:?}, {volume}, height={}{aside}{rate}{more})", spot.z);
+        let line =
+            format!("await {call}(lh, {places}, {used:?}, {volume}, height={}{aside}{rate}{more})", spot.height());
         self.line(&line);
         Ok(())
     }
@@ -269,10 +292,10 @@ impl<'p> Script<'p> {
                 };
                 if command.name == "touchTip" {
                     let radius = command.params.get("radius").and_then(Value::as_f64).unwrap_or(1.0);
-                    self.line(&format!("await touch(lh, {first}, {place}, height={}, radius={radius})", spot.z));
+                    self.line(&format!("await touch(lh, {first}, {place}, height={}, radius={radius})", spot.height()));
                 } else {
                     let (x, y) = (spot.x, spot.y);
-                    self.line(&format!("await move(lh, {first}, {place}, height={}, x={x}, y={y})", spot.z));
+                    self.line(&format!("await move(lh, {first}, {place}, height={}, x={x}, y={y})", spot.height()));
                 }
                 if let Some(pipette) = self.pipettes.get_mut(&name) {
                     pipette.at = Some((row, labware, spot));
@@ -324,6 +347,9 @@ impl<'p> Script<'p> {
             "moveLabware" => {
                 let id = text("labwareId").to_owned();
                 let to = command.params.get("newLocation").cloned().unwrap_or_default();
+                if self.labware.get(&id).is_some_and(|d| d["parameters"]["isTiprack"] == true) {
+                    return Err(no_call(command, "it goes on taking tips where a rack stood first"));
+                }
                 let place = match (to.as_str(), to["slotName"].as_str()) {
                     (Some(_), _) => None,
                     (None, Some(slot)) => Some(slot.to_owned()),
@@ -331,7 +357,10 @@ impl<'p> Script<'p> {
                 };
                 if text("strategy") == "manualMoveWithPause" {
                     let to = place.as_ref().map_or("off the deck".to_owned(), |slot| format!("to slot {slot}"));
-                    self.line(&format!("ask({})", quoted(&format!("Move {id} {to}."))));
+                    self.line(&format!(
+                        "ask({})",
+                        quoted(&format!("Move {} {to}.", self.names.get(&id).unwrap_or(&id)))
+                    ));
                 }
                 if self.slots.remove(&id).is_some() {
                     self.line(&format!("deck.unassign_child_resource({id})"));
