@@ -549,6 +549,40 @@ workflow go in deck {{
     }
 }
 
+#[test]
+fn each_channel_gives_off_its_own_air_first() {
+    let dir = folder("air_of_channels");
+    let text = "mtx 1
+use std::opentrons::{Corning96, OT2, P300Multi, TipRack300}
+lab deck {
+    ambient: 25 degC
+    ot2 = OT2 { left: P300Multi } at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[1]
+    plate = Corning96 on ot2.slot[3] holding { A1: 60 uL of water, B1 .. H1: 200 uL of water }
+}
+workflow go in deck {
+    pick up tip from tips by ot2.left
+    aspirate 100 uL from plate.column(1) by ot2.left { partial: true }
+    dispense 50 uL into plate.column(2) by ot2.left
+    expect abs(plate[A2].contents.volume - 10 uL) < 0.1 uL
+    expect abs(plate[B2].contents.volume - 50 uL) < 0.1 uL
+    move ot2.left to plate.column(3) at top + 5 mm
+    air gap 20 uL by ot2.left
+    dispense 30 uL into plate.column(3) by ot2.left
+    expect abs(plate[A3].contents.volume - 10 uL) < 0.1 uL
+    expect abs(plate[H3].contents.volume - 10 uL) < 0.1 uL
+    dispense 40 uL into plate.column(4) by ot2.left
+    expect abs(plate[A4].contents.volume - 40 uL) < 0.1 uL
+    expect abs(plate[H4].contents.volume - 40 uL) < 0.1 uL
+    drop tip by ot2.left
+}\n";
+    write(&dir, "a.mtx", text);
+    let checked = matterixc_in(&dir, &["check", "a.mtx"]);
+    assert_eq!(checked.code, 0, "{}", checked.out);
+    let ran = matterixc_in(&dir, &["run", "a.mtx"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
 /// What `import` says of steps, and the text.
 fn listed(name: &str, steps: Vec<Value>) -> (String, String) {
     let dir = folder(name);

@@ -40,14 +40,28 @@ struct Well {
 /// The tips of a pipette, uL: their pistons move together, but wells may hold less for some of them than for others.
 #[derive(Clone, Debug, Default)]
 struct Tips {
-    /// In each of them.
-    liquid: Vec<f64>,
-    /// What the piston has taken up: liquid, and air.
+    /// What the pistons have taken up: liquid, and air.
     drawn: f64,
+    each: Vec<Tip>,
+}
+
+/// What a tip holds, uL.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tip {
+    liquid: f64,
     /// Air at the end, which comes out first.
     air: f64,
     /// Air behind the liquid, which comes out last.
     behind: f64,
+}
+
+impl Tips {
+    /// At least so many.
+    fn widen(&mut self, channels: usize) {
+        // A tip that comes to work later has drawn air until then.
+        let new = Tip { air: self.drawn, ..Tip::default() };
+        self.each.resize(channels.max(self.each.len()), new);
+    }
 }
 
 /// What is in wells, beyond what was there at the start, and in tips.
@@ -73,7 +87,7 @@ impl Liquids {
 
     /// Whether the tips of a pipette hold any liquid.
     pub(super) fn is_wet(&self, pipette: &str) -> bool {
-        self.tips.get(pipette).is_some_and(|tips| tips.liquid.iter().any(|liquid| *liquid > 0.0))
+        self.tips.get(pipette).is_some_and(|tips| tips.each.iter().any(|tip| tip.liquid > 0.0))
     }
 
     /// Each tip aspirates so much, as far as it reaches; whether the wells hold less.
@@ -104,13 +118,15 @@ impl Liquids {
             well.least = well.least.min(well.net);
         }
         let tips = self.tips.entry(pipette.to_owned()).or_default();
-        tips.liquid.resize(channels.max(tips.liquid.len()), 0.0);
-        for (channel, liquid) in tips.liquid.iter_mut().enumerate().take(channels) {
-            *liquid += taken.get(of(channel, wells)).map_or(0.0, |taken| taken * share);
+        tips.widen(channels);
+        for (channel, tip) in tips.each.iter_mut().enumerate() {
+            let works = channel < channels;
+            let taken = taken.get(of(channel, wells)).filter(|_| works).map_or(0.0, |taken| taken * share);
+            tip.behind += tip.air;
+            tip.air = (volume - taken).max(0.0);
+            tip.liquid += taken;
         }
         tips.drawn += volume;
-        tips.behind += tips.air;
-        tips.air = (volume - share * taken.iter().fold(0.0, |most: f64, taken| most.max(*taken))).max(0.0);
         lacks
     }
 
@@ -118,26 +134,32 @@ impl Liquids {
     pub(super) fn air(&mut self, pipette: &str, volume: f64) {
         let tips = self.tips.entry(pipette.to_owned()).or_default();
         tips.drawn += volume;
-        tips.air += volume;
+        tips.each.iter_mut().for_each(|tip| tip.air += volume);
     }
 
     /// Each tip dispenses so much: the air at its end first, then the same share of all that it holds, as `dispense` of the library does.
     pub(super) fn dispense(&mut self, pipette: &str, volume: f64, labware: &str, wells: &[String]) {
         let tips = self.tips.entry(pipette.to_owned()).or_default();
-        let (stroke, whole) = ((volume - tips.air).max(0.0), tips.drawn - tips.air - tips.behind);
-        let share = if stroke * (1.0 + 1e-9) >= whole { 1.0 } else { stroke / whole };
-        let given: Vec<f64> = tips.liquid.iter().map(|liquid| liquid * share).collect();
-        tips.liquid.iter_mut().zip(&given).for_each(|(liquid, given)| *liquid -= given);
-        tips.behind = tips.behind.min((tips.drawn - volume - (tips.air - volume).max(0.0)).max(0.0));
-        tips.drawn = (tips.drawn - volume).max(0.0);
-        tips.air = (tips.air - volume).max(0.0);
+        let drawn = tips.drawn;
+        let give = |tip: &mut Tip| {
+            let (stroke, whole) = ((volume - tip.air).max(0.0), drawn - tip.air - tip.behind);
+            let share = if stroke * (1.0 + 1e-9) >= whole { 1.0 } else { stroke / whole };
+            let given = tip.liquid * share;
+            tip.liquid -= given;
+            tip.behind = tip.behind.min((drawn - volume - (tip.air - volume).max(0.0)).max(0.0));
+            tip.air = (tip.air - volume).max(0.0);
+            given
+        };
+        let given: Vec<f64> = tips.each.iter_mut().map(give).collect();
+        tips.drawn = (drawn - volume).max(0.0);
         self.fill(labware, wells, &given);
     }
 
     /// Each tip gives off what it holds.
     pub(super) fn blow_out(&mut self, pipette: &str, labware: &str, wells: &[String]) {
         let tips = self.tips.remove(pipette).unwrap_or_default();
-        self.fill(labware, wells, &tips.liquid);
+        let given: Vec<f64> = tips.each.iter().map(|tip| tip.liquid).collect();
+        self.fill(labware, wells, &given);
     }
 
     fn fill(&mut self, labware: &str, wells: &[String], given: &[f64]) {
