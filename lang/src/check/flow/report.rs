@@ -188,6 +188,7 @@ impl Interpreter<'_, '_> {
     pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &AbstractState, warns: bool) {
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &presumed.refusal {
+            Some(r) if warns => format!("`{label}` goes wrong: {}", r.failure.replace('_', " ")),
             Some(r) => format!("`{label}` has no effect: {}", r.failure.replace('_', " ")),
             None => format!("`{label}` has no effect: it presumes `{}`, which was never true", presumed.text),
         };
