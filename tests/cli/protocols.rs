@@ -1,5 +1,7 @@
 //! Protocols of Opentrons that are imported, checked and written again.
 
+use std::path::Path;
+
 use serde_json::{Map, Value, json};
 
 use crate::harness::{flat, folder, matterixc_in, write};
@@ -541,11 +543,8 @@ workflow go in deck {{
     ];
     for (steps, expected, warned) in cases {
         write(&dir, "a.mtx", text("A1: 100 uL of water", &steps, &expected));
-        let checked = matterixc_in(&dir, &["check", "a.mtx"]);
-        assert_eq!(checked.code, 0, "{steps} {expected}: {}", checked.out);
-        assert_eq!(checked.out.contains("above-liquid"), warned, "{steps}: {}", checked.out);
-        let ran = matterixc_in(&dir, &["run", "a.mtx"]);
-        assert_eq!(ran.code, 0, "{steps} {expected}: {}{}", ran.out, ran.err);
+        let said = checked_and_run(&dir, &format!("{steps} {expected}"));
+        assert_eq!(said.contains("above-liquid"), warned, "{steps}: {said}");
     }
 }
 
@@ -577,10 +576,7 @@ workflow go in deck {
     drop tip by ot2.left
 }\n";
     write(&dir, "a.mtx", text);
-    let checked = matterixc_in(&dir, &["check", "a.mtx"]);
-    assert_eq!(checked.code, 0, "{}", checked.out);
-    let ran = matterixc_in(&dir, &["run", "a.mtx"]);
-    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    checked_and_run(&dir, "channels");
 }
 
 /// What `import` says of steps, and the text.
@@ -883,11 +879,17 @@ fn air_is_taken_above_a_liquid_and_comes_out_in_its_place() {
     ] {
         let expect = format!("    expect plate[A1].contents.volume in {given} uL - 0.1 uL .. {given} uL + 0.1 uL\n");
         write(&dir, "a.mtx", bench_of(&format!("{steps}{expect}")));
-        let ran = matterixc_in(&dir, &["run", "a.mtx"]);
-        assert_eq!(ran.code, 0, "{steps}: {}{}", ran.out, ran.err);
-        let checked = matterixc_in(&dir, &["check", "a.mtx", "--no-cache"]);
-        assert_eq!(checked.code, 0, "{steps}: {}", checked.out);
+        checked_and_run(&dir, &steps);
     }
+}
+
+/// What `check` says of a file that it finds right, and that runs to its end: expectations hold in both.
+fn checked_and_run(dir: &Path, what: &str) -> String {
+    let checked = matterixc_in(dir, &["check", "a.mtx", "--no-cache"]);
+    assert_eq!(checked.code, 0, "{what}: {}", checked.out);
+    let ran = matterixc_in(dir, &["run", "a.mtx"]);
+    assert_eq!(ran.code, 0, "{what}: {}{}", ran.out, ran.err);
+    checked.out
 }
 
 #[test]

@@ -59,7 +59,7 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
     if !found.is_empty() {
         return Err(found);
     }
-    let count: usize = script.pipettes.values().map(|pipette| pipette.channels.len()).sum();
+    let count = script.channels();
     let workflow = quoted(&protocol.subject.program.plan.workflow);
     let Script { loads, steps, .. } = script;
     let steps = if steps.is_empty() { "    pass\n" } else { &steps };
@@ -127,11 +127,16 @@ impl<'p> Script<'p> {
         let _ = writeln!(self.steps, "    {text}");
     }
 
+    /// How many channels all pipettes have.
+    fn channels(&self) -> usize {
+        self.pipettes.values().map(|pipette| pipette.channels.len()).sum()
+    }
+
     fn load(&mut self, command: &Command) -> Result<(), Diagnostic> {
         let text = |name: &str| command.text(name);
         match command.name {
             "loadPipette" => {
-                let first: usize = self.pipettes.values().map(|pipette| pipette.channels.len()).sum();
+                let first = self.channels();
                 let count = if text("pipetteName").contains("multi") { 8 } else { 1 };
                 let model = text("pipetteName").to_owned();
                 if self.pipettes.values().any(|other| other.model == model) {
@@ -171,6 +176,7 @@ impl<'p> Script<'p> {
     }
 
     /// The wells that the channels of a pipette reach where the first one goes to a well: those that are there, in a row, or a trough for each.
+    /// None in the bin, which is no labware.
     fn row(&self, labware: &str, well: &str, channels: usize) -> Vec<String> {
         let Some(definition) = self.labware.get(labware) else { return Vec::new() };
         let at = |well: &Value, axis: &str| well[axis].as_f64().unwrap_or(f64::NAN);
@@ -211,13 +217,19 @@ impl<'p> Script<'p> {
         if self.pipettes.iter().any(|(other, pipette)| *other != name && pipette.tips > 0) {
             return Err(no_call(command, "both pipettes carry tips, and it chooses between them by the volume"));
         }
-        let spot = self.spot(command);
-        let labware = command.text("labwareId").to_owned();
-        let channels = self.pipettes.get(&name).map_or(1, |pipette| pipette.channels.len());
-        let row = if labware == BIN { Vec::new() } else { self.row(&labware, command.text("wellName"), channels) };
-        let Some(pipette) = self.pipettes.get_mut(&name) else { return Err(no_call(command, "no such pipette")) };
-        pipette.at = Some((row, labware, spot));
+        self.go(command);
         self.pass_here(call, &name, volume, command, more)
+    }
+
+    /// Takes a pipette to the place of a command: the wells that its channels reach, and where in them.
+    fn go(&mut self, command: &Command) -> (Vec<String>, Spot) {
+        let (name, labware) = (command.text("pipetteId"), command.text("labwareId"));
+        let channels = self.pipettes.get(name).map_or(1, |pipette| pipette.channels.len());
+        let (row, spot) = (self.row(labware, command.text("wellName"), channels), self.spot(command));
+        if let Some(pipette) = self.pipettes.get_mut(name) {
+            pipette.at = Some((row.clone(), labware.to_owned(), spot));
+        }
+        (row, spot)
     }
 
     /// The same where the pipette is.
@@ -283,9 +295,9 @@ impl<'p> Script<'p> {
                 self.draw(&name, number("volume"));
             }
             "moveToWell" | "touchTip" => {
-                let (labware, spot) = (text("labwareId").to_owned(), self.spot(command));
-                let row = if labware == BIN { Vec::new() } else { self.row(&labware, text("wellName"), count) };
-                let place = match (labware.as_str(), row.first()) {
+                let (row, spot) = self.go(command);
+                let labware = text("labwareId");
+                let place = match (labware, row.first()) {
                     (BIN, _) => "deck.get_trash_area()".to_owned(),
                     (_, Some(well)) => format!("at({labware}, {})[0]", quoted(well)),
                     (_, None) => return Err(no_call(command, "this labware is not on the deck")),
@@ -296,9 +308,6 @@ impl<'p> Script<'p> {
                 } else {
                     let (x, y) = (spot.x, spot.y);
                     self.line(&format!("await move(lh, {first}, {place}, height={}, x={x}, y={y})", spot.height()));
-                }
-                if let Some(pipette) = self.pipettes.get_mut(&name) {
-                    pipette.at = Some((row, labware, spot));
                 }
             }
             "moveToCoordinates" => {
@@ -315,11 +324,7 @@ impl<'p> Script<'p> {
             }
             "dropTip" | "dropTipInPlace" => {
                 let rack = text("labwareId").to_owned();
-                let row: Vec<String> = if rack.is_empty() || rack == BIN {
-                    Vec::new()
-                } else {
-                    self.row(&rack, text("wellName"), count).into_iter().take(tips).collect()
-                };
+                let row: Vec<String> = self.row(&rack, text("wellName"), count).into_iter().take(tips).collect();
                 let Some(pipette) = self.pipettes.get_mut(&name) else { return Ok(()) };
                 let used = pipette.channels[..tips].to_vec();
                 let over = std::mem::take(&mut pipette.aimed) || rack == BIN;
