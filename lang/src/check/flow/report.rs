@@ -42,6 +42,13 @@ impl Finding {
             && self.about == other.about
     }
 
+    /// Counts it once more, on ways of which so many had met before, where so many choices and handlers are open.
+    fn count_again(&mut self, some: Option<usize>, open: usize) {
+        self.count += 1;
+        self.open = self.open.min(open);
+        self.some = self.some.zip(some).map(|(old, new)| old.min(new));
+    }
+
     /// Says that it holds only where a device reports one of these failures.
     pub fn only_where_reported(&mut self, names: &[String]) {
         let names: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
@@ -152,22 +159,31 @@ impl Interpreter<'_, '_> {
 
     /// Adds a finding that is made on some ways, of which so many had met before.
     fn found_on(&mut self, diagnostic: Diagnostic, about: Span, some: Option<usize>, turn: bool) {
-        if self.quiet > 0 {
+        let severity = diagnostic.severity;
+        if self.quiet > 0 || self.is_counted(diagnostic.code, (diagnostic.span(), about), severity, some) {
             return;
         }
         let new =
             Finding { diagnostic, about, count: 1, some, turn, open: self.open, one_order: false, by_failure: false };
         match self.findings.iter_mut().find(|f| f.is_like(&new)) {
             Some(old) => {
-                old.count += 1;
-                old.open = old.open.min(new.open);
-                old.some =
-                    old.some.and(new.some).map(|meetings| old.some.map_or(meetings, |first| first.min(meetings)));
-                if new.is_error() && !old.is_error() {
-                    old.diagnostic = new.diagnostic;
-                }
+                old.count_again(some, new.open);
+                old.diagnostic = new.diagnostic;
             }
             None => self.findings.push(new),
+        }
+    }
+
+    /// Counts a finding that was made before at this place, and was as bad then; whether it was.
+    fn is_counted(&mut self, code: Code, place: Place, severity: Severity, some: Option<usize>) -> bool {
+        let open = self.open;
+        let mut old = self.findings.iter_mut().filter(|f| f.diagnostic.code == code && f.place() == place);
+        match old.next().filter(|f| f.is_error() || severity != Severity::Error) {
+            Some(old) => {
+                old.count_again(some, open);
+                true
+            }
+            None => false,
         }
     }
 
@@ -206,9 +222,22 @@ impl Interpreter<'_, '_> {
         facts: &AbstractState,
         (some, severity): (bool, Option<Severity>),
     ) {
+        if self.quiet > 0 {
+            return;
+        }
         let code = need.code();
         let open = some.then(|| self.ways.meetings());
         let some = some || self.doubt > 0;
+        let severity = severity.unwrap_or_else(|| self::severity(code, some));
+        let site = self.site();
+        // The first that is missing ends a call; what its later steps lack follows from that.
+        if self.findings.iter().any(|f| f.is_error() && f.diagnostic.span() == site && f.about != need.span) {
+            return;
+        }
+        // The words of a finding cost as much as the plan is long; those of a known one would not be read.
+        if self.is_counted(code, (site, need.span), severity, open) {
+            return;
+        }
         let failing = self.failing(need, facts);
         let asked = failing.first().copied().unwrap_or(need);
         let words = self.worded(need, facts);
@@ -223,11 +252,7 @@ impl Interpreter<'_, '_> {
             (false, false) => measured.join(", "),
         };
         let mut d = self.at_site(code, headline, said, some);
-        d.severity = severity.unwrap_or(d.severity);
-        // The first that is missing ends a call; what its later steps lack follows from that.
-        if self.findings.iter().any(|f| f.is_error() && f.diagnostic.span() == d.span() && f.about != need.span) {
-            return;
-        }
+        d.severity = severity;
         // Words say it without the library's formula.
         if d.span() != need.span && (words.is_empty() || !self.in_library(need.span)) {
             d = d.because(need.span, format!("needed here: `{}`", need.text));
