@@ -151,7 +151,9 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
                 if extends.is_empty() {
                     extends.extend(kind);
                 }
-                lines.extend(given);
+                // A shape that the asset gives replaces the body of a definition, wherever that stands.
+                let shaped = word.text == "labware" && lines.iter().any(|line| is_field(line, "shape"));
+                lines.extend(given.into_iter().filter(|line| !(shaped && matches!(line, AssetLine::Solid { .. }))));
             }
             Err(unread) => {
                 beside.found.push(unread.told(format.code, path));
@@ -161,6 +163,11 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
         }
     }
     beside.found
+}
+
+/// Whether a line gives a field.
+fn is_field(line: &AssetLine, key: &str) -> bool {
+    matches!(line, AssetLine::Field(field) if field.key.text == key)
 }
 
 /// The shapes that a line of an asset gives.

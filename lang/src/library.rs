@@ -62,6 +62,7 @@ macro_rules! files {
 }
 
 files! {
+    "robots/flex/" => "flex.urdf"
     "robots/fr3/" => "fr3.urdf"
     "robots/franka_hand/" => "franka_hand.urdf"
     "robots/iiwa14/" => "iiwa14.urdf"

@@ -18,6 +18,32 @@ pub(super) struct Loaded {
     pub(super) about: About,
 }
 
+/// Where tips and liquids are thrown away.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Waste {
+    /// The bin that is part of the robot.
+    Fixed,
+    /// A bin in a place of the deck.
+    Bin(String),
+    /// The chute.
+    Chute,
+}
+
+impl Waste {
+    /// The area of the deck that so many channels of a pipette go to.
+    pub(super) fn area(&self, channels: &str) -> String {
+        match self {
+            Waste::Fixed => BIN.to_owned(),
+            Waste::Bin(slot) => format!("movableTrash{slot}"),
+            Waste::Chute => format!("{channels}{CHUTE}"),
+        }
+    }
+}
+
+/// How areas of the chute end, and the one for the gripper.
+pub(super) const CHUTE: &str = "ChannelWasteChute";
+pub(super) const GRIPPER_CHUTE: &str = "gripperWasteChute";
+
 /// Where something stands.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Location {
@@ -29,6 +55,8 @@ pub(super) enum Location {
     Labware(String),
     /// Anywhere but on the deck.
     Off,
+    /// Down the chute.
+    Chute,
 }
 
 /// Words of Python, and names that a protocol or a program for PyLabRobot has for itself.
@@ -95,11 +123,12 @@ pub(super) struct Deck<'p> {
     scene: &'p Scene,
     robot: InstanceId,
     loaded: BTreeMap<InstanceId, Loaded>,
+    wastes: BTreeMap<InstanceId, Waste>,
 }
 
 impl<'p> Deck<'p> {
     pub(super) fn new(scene: &'p Scene, robot: InstanceId) -> Self {
-        Deck { scene, robot, loaded: BTreeMap::new() }
+        Deck { scene, robot, loaded: BTreeMap::new(), wastes: BTreeMap::new() }
     }
 
     /// What an instance was loaded as.
@@ -130,6 +159,9 @@ impl<'p> Deck<'p> {
     /// Where what stands on this thing stands; none where that is neither a place of this deck nor a module or labware on it.
     pub(super) fn location(&self, name: &str) -> Option<Location> {
         let support = self.scene.find(name)?;
+        if self.wastes.get(&support) == Some(&Waste::Chute) {
+            return Some(Location::Chute);
+        }
         match self.loaded.get(&support) {
             Some(Loaded { id, about: About::Module }) => return Some(Location::Module(id.clone())),
             Some(Loaded { id, about: About::Labware }) => return Some(Location::Labware(id.clone())),
@@ -137,6 +169,20 @@ impl<'p> Deck<'p> {
             None => {}
         }
         (self.scene.get(support).owner == Some(self.robot)).then(|| Location::Slot(label(name).to_owned()))
+    }
+
+    /// Keeps where a bin stands.
+    pub(super) fn keep_waste(&mut self, id: InstanceId, waste: Waste) {
+        self.wastes.insert(id, waste);
+    }
+
+    /// What bin a name means, or one of the places of it.
+    pub(super) fn waste(&self, name: &str) -> Option<Waste> {
+        let id = self.scene.find(name)?;
+        match self.wastes.get(&id) {
+            Some(waste) => Some(waste.clone()),
+            None => (self.scene.get(id).owner == Some(self.robot)).then_some(Waste::Fixed),
+        }
     }
 
     /// Where labware stands that is put on the deck, or taken off it.
@@ -152,7 +198,8 @@ impl<'p> Deck<'p> {
         if !self.loaded.contains_key(&whole) && self.scene.get(whole).owner == Some(self.robot) {
             return Some((BIN.to_owned(), label(&instance.name).to_owned()));
         }
-        let labware = self.loaded.get(&instance.owner?).filter(|l| l.about == About::Labware)?;
+        let holds = |l: &&Loaded| matches!(l.about, About::Labware | About::Bin);
+        let labware = self.loaded.get(&instance.owner?).filter(holds)?;
         Some((labware.id.clone(), label(&instance.name).to_owned()))
     }
 }

@@ -12,6 +12,8 @@ pub(super) enum About {
     Labware,
     /// The module.
     Module,
+    /// The bin, or the chute.
+    Bin,
     /// A well: its labware and its name.
     Well,
 }
@@ -41,6 +43,14 @@ pub(super) enum Holds {
     Coordinate,
     /// What a thing stands on: a place of the deck, or a module.
     Location,
+    /// Labware by its name in the lab.
+    Labware,
+    /// How far from where the gripper usually grips or lets go, along an axis, mm: `pickUpOffset/x`.
+    Shift,
+    /// A bin or a chute for tips.
+    Bin,
+    /// For a chute, how many channels go there.
+    Channels,
     /// A labware definition by `NAMESPACE/NAME/VERSION`.
     Definition,
 }
@@ -66,6 +76,16 @@ impl Form {
         self.needs.iter().chain(self.takes).chain(self.spot).find(|(n, _)| *n == name).map(|(_, holds)| *holds)
     }
 }
+
+/// The messages that load a bin or a chute, for which JSON has no command.
+pub(super) const TRASH_BIN: &str = "loadTrashBin";
+pub(super) const WASTE_CHUTE: &str = "loadWasteChute";
+
+/// The parameter of these that holds what the bin is called.
+pub(super) const BIN_ID: &str = "binId";
+
+/// The message that the gripper is to move labware.
+pub(super) const BY_GRIPPER: &str = "moveLabwareByGripper";
 
 /// Where a pipette does something in a well.
 const SPOT: &[(&str, Holds)] =
@@ -96,6 +116,22 @@ const FORMS: &[Form] = &[
     form("loadPipette", About::Pipette, &[("pipetteName", Text), ("mount", Text)], &[]),
     form("loadLabware", About::Labware, &[("definition", Definition), ("location", Location)], &[]),
     form("moveLabware", About::Labware, &[("newLocation", Location), ("strategy", Text)], &[]),
+    // What the gripper does, which the run engine calls `moveLabware` too.
+    form(
+        BY_GRIPPER,
+        About::Robot,
+        &[("labware", Holds::Labware), ("newLocation", Location)],
+        &[
+            ("pickUpOffset/x", Holds::Shift),
+            ("pickUpOffset/y", Holds::Shift),
+            ("pickUpOffset/z", Holds::Shift),
+            ("dropOffset/x", Holds::Shift),
+            ("dropOffset/y", Holds::Shift),
+            ("dropOffset/z", Holds::Shift),
+        ],
+    ),
+    form(TRASH_BIN, About::Bin, &[("location", Location)], &[]),
+    form(WASTE_CHUTE, About::Bin, &[("location", Location)], &[]),
     form("loadModule", About::Module, &[("model", Text), ("location", Location)], &[]),
     form("loadLiquid", About::Well, &[("volume", Number)], &[]),
     at("pickUpTip", &[("well", Well)], &[]),
@@ -119,7 +155,7 @@ const FORMS: &[Form] = &[
     form(
         "moveToAddressableAreaForDropTip",
         About::Pipette,
-        &[("addressableAreaName", Text)],
+        &[("bin", Holds::Bin), ("channels", Holds::Channels)],
         &[("alternateDropLocation", Flag)],
     ),
     form("dropTipInPlace", About::Pipette, &[], &[]),

@@ -27,7 +27,10 @@ const WHAT: &str = "an Opentrons protocol";
 /// A JSON protocol of schema 8, with commands of schema 8.
 pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let (protocol, warnings) = protocol(subject, performance)?;
-    let beyond = |c: &&protocol::Command| c.name == "setTipState" || c.text("labwareId") == deck::BIN;
+    let bins = protocol.bins();
+    let beyond = |c: &&protocol::Command| {
+        c.name == "setTipState" || c.text("labwareId") == deck::BIN || bins.contains(c.text("labwareId"))
+    };
     if let Some(command) = protocol.commands.iter().find(beyond) {
         let headline = format!("{WHAT} in JSON cannot refill a rack or dispense into the bin");
         let d = not_expressible(command.at, headline, "this step sends it").help("use `--target opentrons-python`");
@@ -45,6 +48,12 @@ pub fn python(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
 /// A program for PyLabRobot.
 pub fn pylabrobot(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let (protocol, warnings) = protocol(subject, performance)?;
+    if let Some(kind) = protocol.robot.setting("type").filter(|kind| *kind != "OT-2") {
+        let at = subject.program.plan.get(subject.program.plan.root).span;
+        let headline = format!("a program for PyLabRobot cannot be for a {kind}");
+        let d = not_expressible(at, headline, "this workflow uses one").help("use `--target opentrons-python`");
+        return Err(vec![d]);
+    }
     Ok((pylabrobot::write(&protocol)?, warnings))
 }
 

@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::WHAT;
 use super::deck::Deck;
+use super::form::{BIN_ID, TRASH_BIN, WASTE_CHUTE};
 use super::writer::{MOVES, Writer};
 use crate::Subject;
 use crate::finding::not_expressible;
@@ -55,6 +56,12 @@ pub(super) struct Protocol<'p> {
 }
 
 impl<'p> Protocol<'p> {
+    /// Identifiers of the bins that are loaded.
+    pub(super) fn bins(&self) -> BTreeSet<String> {
+        let loads = self.loads.iter().filter(|c| [TRASH_BIN, WASTE_CHUTE].contains(&c.name));
+        loads.map(|c| c.text(BIN_ID).to_owned()).collect()
+    }
+
     /// The protocol of what was done; what has no counterpart goes into `found`.
     pub(super) fn of(
         subject: Subject<'p>,

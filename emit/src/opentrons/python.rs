@@ -7,7 +7,8 @@ use matterix_ir::{Diagnostic, Span};
 use serde_json::Value;
 
 use super::WHAT;
-use super::deck::BIN;
+use super::deck::{BIN, CHUTE, GRIPPER_CHUTE};
+use super::form::{BIN_ID, TRASH_BIN, WASTE_CHUTE};
 use super::protocol::{Command, Protocol};
 use crate::finding::not_expressible;
 use crate::place;
@@ -21,6 +22,8 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
         binned: BTreeSet::new(),
         aimed: None,
         slots: BTreeMap::new(),
+        bins: protocol.bins(),
+        areas: BTreeMap::new(),
     };
     script.head(protocol);
     let mut found = Vec::new();
@@ -59,6 +62,16 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
     if found.is_empty() { Ok(script.text.into_bytes()) } else { Err(found) }
 }
 
+/// Pipettes that the Python API calls otherwise than the run engine.
+const CALLED: [(&str, &str); 6] = [
+    ("p50_single_flex", "flex_1channel_50"),
+    ("p50_multi_flex", "flex_8channel_50"),
+    ("p1000_single_flex", "flex_1channel_1000"),
+    ("p1000_multi_flex", "flex_8channel_1000"),
+    ("p200_96", "flex_96channel_200"),
+    ("p1000_96", "flex_96channel_1000"),
+];
+
 /// A set point, the wait that follows, and the call that is both.
 const TEMPERED: [(&str, &str, &str); 3] = [
     ("temperatureModule/setTargetTemperature", "temperatureModule/waitForTemperature", "set_temperature"),
@@ -79,8 +92,12 @@ struct Script {
     targets: BTreeMap<String, String>,
     /// Pipettes that were at the bin last: it is no place for what is done in place.
     binned: BTreeSet<String>,
-    /// The pipette that was brought over an area to drop its tip.
-    aimed: Option<String>,
+    /// The pipette that was brought over an area to drop its tip, and what is called there.
+    aimed: Option<(String, String)>,
+    /// Bins and chutes that are loaded.
+    bins: BTreeSet<String>,
+    /// The same by their areas; the chute by what its areas end in.
+    areas: BTreeMap<String, String>,
     /// In which slot labware stands.
     slots: BTreeMap<String, String>,
 }
@@ -148,11 +165,14 @@ impl Script {
 
     /// Loads something; whether there is a call for it.
     fn load(&mut self, command: &Command, protocol: &Protocol<'_>) -> bool {
-        let (text, slot) = (|name: &str| command.text(name), |v: &Value| v["slotName"].as_str().map(quoted));
+        let text = |name: &str| command.text(name);
+        let slot = |v: &Value| v["slotName"].as_str().or(v["addressableAreaName"].as_str()).map(quoted);
         let location = command.params.get("location").cloned().unwrap_or_default();
         match command.name {
             "loadPipette" => {
-                let (name, mount) = (quoted(text("pipetteName")), quoted(text("mount")));
+                let name = text("pipetteName");
+                let called = CALLED.iter().find(|(engine, _)| *engine == name).map_or(name, |(_, python)| *python);
+                let (name, mount) = (quoted(called), quoted(text("mount")));
                 self.line(&format!("{} = protocol.load_instrument({name}, {mount})", text("pipetteId")));
             }
             "loadModule" => {
@@ -192,6 +212,15 @@ impl Script {
                     self.line(&format!("{place}.load_liquid({}, {})", text("liquidId"), shown(Some(volume))));
                 }
             }
+            TRASH_BIN => {
+                let Some(slot) = location["slotName"].as_str() else { return false };
+                self.areas.insert(format!("movableTrash{slot}"), text(BIN_ID).to_owned());
+                self.line(&format!("{} = protocol.load_trash_bin({})", text(BIN_ID), quoted(slot)));
+            }
+            WASTE_CHUTE => {
+                self.areas.insert(CHUTE.to_owned(), text(BIN_ID).to_owned());
+                self.line(&format!("{} = protocol.load_waste_chute()", text(BIN_ID)));
+            }
             // What brings a module into its state at the start.
             _ => return self.call(command),
         }
@@ -204,11 +233,14 @@ impl Script {
         let number = |name: &str| shown(command.params.get(name));
         let (pipette, module) = (text("pipetteId"), text("moduleId"));
         let well = format!("{}[{}]", text("labwareId"), quoted(text("wellName")));
-        let spot = spot(command, &well);
+        let spot = match self.bins.contains(text("labwareId")) {
+            true => text("labwareId").to_owned(),
+            false => spot(command, &well),
+        };
         let offset = |axis: &str| shown(command.params.get("wellLocation").map(|location| &location["offset"][axis]));
         let aimed = self.aimed.take();
         match (text("labwareId"), command.params.contains_key("coordinates")) {
-            (BIN, _) => drop(self.binned.insert(pipette.to_owned())),
+            (id, _) if id == BIN || self.bins.contains(id) => drop(self.binned.insert(pipette.to_owned())),
             ("", false) => {}
             _ => drop(self.binned.remove(pipette)),
         }
@@ -261,12 +293,22 @@ impl Script {
                     self.line(&format!("del protocol.deck[{}]", quoted(&slot)));
                     return true;
                 }
-                let place = match (to["slotName"].as_str(), to["moduleId"].as_str().or(to["labwareId"].as_str())) {
+                let slot = to["slotName"].as_str().or(to["addressableAreaName"].as_str());
+                let place = match (slot, to["moduleId"].as_str().or(to["labwareId"].as_str())) {
+                    (Some(GRIPPER_CHUTE), _) => self.areas.get(CHUTE).cloned().unwrap_or_default(),
                     (Some(slot), _) => quoted(slot),
                     (None, Some(id)) => id.to_owned(),
                     (None, None) => "protocol_api.OFF_DECK".to_owned(),
                 };
-                self.line(&format!("protocol.move_labware({}, {place})", text("labwareId")));
+                let gripper = if text("strategy") == "usingGripper" { ", use_gripper=True" } else { "" };
+                let shift = |key: &str, name: &str| {
+                    let at = |axis: &str| shown(command.params.get(key).map(|offset| &offset[axis]));
+                    command.params.get(key).map_or(String::new(), |_| {
+                        format!(", {name}={{\"x\": {}, \"y\": {}, \"z\": {}}}", at("x"), at("y"), at("z"))
+                    })
+                };
+                let (pick, drop) = (shift("pickUpOffset", "pick_up_offset"), shift("dropOffset", "drop_offset"));
+                self.line(&format!("protocol.move_labware({}, {place}{gripper}{pick}{drop})", text("labwareId")));
             }
             "setTipState" => self.line(&format!("{}.reset()", text("labwareId"))),
             "home" => match command.params.get("axes").and_then(Value::as_array) {
@@ -298,13 +340,19 @@ impl Script {
             "magneticModule/disengage" => self.line(&format!("{module}.disengage()")),
             "heaterShaker/waitForTemperature" => self.line(&format!("{module}.wait_for_temperature()")),
             "dropTip" => self.line(&format!("{pipette}.drop_tip({spot})")),
-            "moveToAddressableAreaForDropTip" if text("addressableAreaName") == "fixedTrash" => {
-                self.aimed = Some(pipette.to_owned());
+            "moveToAddressableAreaForDropTip" | "moveToAddressableArea" => {
+                let area = text("addressableAreaName");
+                let area = if area.ends_with(CHUTE) { CHUTE } else { area };
+                let bin =
+                    if area == BIN { Some("protocol.fixed_trash") } else { self.areas.get(area).map(String::as_str) };
+                let Some(bin) = bin else { return false };
+                self.aimed = Some((pipette.to_owned(), bin.to_owned()));
             }
             // The call goes there by itself.
-            "dropTipInPlace" if aimed.as_deref() == Some(pipette) => {
-                self.line(&format!("{pipette}.drop_tip(protocol.fixed_trash)"));
-            }
+            "dropTipInPlace" => match aimed {
+                Some((aimed, bin)) if aimed == pipette => self.line(&format!("{pipette}.drop_tip({bin})")),
+                _ => return false,
+            },
             "waitForDuration" => self.line(&format!("protocol.delay(seconds={})", number("seconds"))),
             "waitForResume" => self.line(&format!("protocol.pause({})", quoted(text("message")))),
             "comment" => self.line(&format!("protocol.comment({})", quoted(text("message")))),

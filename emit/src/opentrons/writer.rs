@@ -9,8 +9,8 @@ use matterix_ir::{Diagnostic, Span};
 use serde_json::{Map, Value, json};
 
 use super::WHAT;
-use super::deck::{Deck, Location};
-use super::form::{About, Holds};
+use super::deck::{Deck, GRIPPER_CHUTE, Location, Waste};
+use super::form::{About, BIN_ID, BY_GRIPPER, Holds, TRASH_BIN};
 use super::message::{Message, names};
 use super::protocol::{Command, Protocol, belongs};
 use crate::finding::not_expressible;
@@ -95,7 +95,7 @@ impl Writer<'_, '_> {
         let here = match message.form.about {
             About::Robot => true,
             About::Pipette => belongs(self.protocol.subject, wired.device, robot),
-            About::Labware | About::Module => match message.get("location") {
+            About::Labware | About::Module | About::Bin => match message.get("location") {
                 Some(location) => self.deck.location(location).is_some() || self.moved.contains_key(&wired.device),
                 None => self.deck.get(wired.device).is_some(),
             },
@@ -106,6 +106,11 @@ impl Writer<'_, '_> {
         }
         if message.form.about != About::Well && self.deck.get(wired.device).is_none() {
             self.deck.load(wired.device, message.form.about);
+        }
+        if message.form.about == About::Bin {
+            let slot = super::deck::label(message.get("location").unwrap_or_default()).to_owned();
+            let waste = if message.form.name == TRASH_BIN { Waste::Bin(slot) } else { Waste::Chute };
+            self.deck.keep_waste(wired.device, waste);
         }
         match self.command(wired.device, &message, at) {
             Ok(command) => self.protocol.loads.push(command),
@@ -150,7 +155,7 @@ impl Writer<'_, '_> {
         if let Some(load) = self.later.remove(&device) {
             return self.bring(device, &load, said, at);
         }
-        if self.deck.get(device).is_none() && device != self.protocol.robot.device {
+        if self.deck.get(device).is_none() && !belongs(self.protocol.subject, device, self.protocol.robot.device) {
             let headline =
                 format!("`{}` is not a part of `{}`", self.name(device), self.name(self.protocol.robot.device));
             return self.found.push(not_expressible(at, headline, format!("this step does `{}`", step.label)));
@@ -169,6 +174,7 @@ impl Writer<'_, '_> {
         let own = self.deck.get(device).map(|l| l.id.clone()).unwrap_or_default();
         match message.form.about {
             About::Robot => {}
+            About::Bin => drop(params.insert(BIN_ID.to_owned(), own.into())),
             About::Pipette => drop(params.insert("pipetteId".to_owned(), own.into())),
             About::Module => drop(params.insert("moduleId".to_owned(), own.into())),
             About::Labware => drop(params.insert("labwareId".to_owned(), own.into())),
@@ -178,24 +184,29 @@ impl Writer<'_, '_> {
                 params.insert("wellName".to_owned(), well.into());
             }
         }
+        let mut name = message.form.name;
+        if name == BY_GRIPPER {
+            name = "moveLabware";
+            params.insert("strategy".to_owned(), "usingGripper".into());
+        }
         let mut spot = Map::new();
-        for (name, value) in &message.fields {
-            let Some(holds) = message.form.field(name) else { continue };
-            let key = (*name).to_owned();
+        for (field, value) in &message.fields {
+            let Some(holds) = message.form.field(field) else { continue };
+            let key = (*field).to_owned();
             match holds {
                 Holds::Text => drop(params.insert(key, value.as_str().into())),
-                Holds::Number => drop(params.insert(key, parsed(message, name, value)?.into())),
+                Holds::Number => drop(params.insert(key, parsed(message, field, value)?.into())),
                 Holds::Mount => {
                     drop(params.insert("axes".to_owned(), json!([format!("{value}Z"), format!("{value}Plunger")])))
                 }
                 Holds::Plunger => drop(params.insert("axes".to_owned(), json!([format!("{value}Plunger")]))),
                 Holds::Given => {
-                    let value = parsed(message, name, value)?;
+                    let value = parsed(message, field, value)?;
                     if value != 0.0 {
                         params.insert(key, value.into());
                     }
                 }
-                Holds::Flag => drop(params.insert(key, flag(message, name, value)?.into())),
+                Holds::Flag => drop(params.insert(key, flag(message, field, value)?.into())),
                 Holds::Well => {
                     let (labware, well) = self.well(message, value, at)?;
                     params.insert("labwareId".to_owned(), labware.into());
@@ -208,30 +219,69 @@ impl Writer<'_, '_> {
                 Holds::Offset => {
                     let offset = spot.entry("offset").or_insert_with(|| json!({ "x": 0, "y": 0, "z": 0 }));
                     // None is not less than none.
-                    offset[*name] = (parsed(message, name, value)? + 0.0).into();
+                    offset[*field] = (parsed(message, field, value)? + 0.0).into();
                 }
                 Holds::Coordinate => {
                     let place = params.entry("coordinates").or_insert_with(|| json!({}));
-                    place[*name] = (parsed(message, name, value)? + 0.0).into();
+                    place[*field] = (parsed(message, field, value)? + 0.0).into();
                 }
                 Holds::Location => {
                     let location = self.deck.location_or_off(value);
                     let _ = if location == Location::Off { self.off.insert(device) } else { self.off.remove(&device) };
                     let location = match location {
+                        Location::Slot(slot) if is_staging(&slot) => json!({ "addressableAreaName": slot }),
                         Location::Slot(slot) => json!({ "slotName": slot }),
+                        Location::Chute => json!({ "addressableAreaName": GRIPPER_CHUTE }),
                         Location::Module(id) => json!({ "moduleId": id }),
                         Location::Labware(id) => json!({ "labwareId": id }),
                         Location::Off => json!("offDeck"),
                     };
                     params.insert(key, location);
                 }
+                Holds::Labware => {
+                    let scene = &self.protocol.subject.program.scene;
+                    let labware = scene.find(value).and_then(|id| self.deck.get(id));
+                    let Some(labware) = labware.filter(|l| l.about == About::Labware) else {
+                        let headline =
+                            format!("`{value}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
+                        let help = "place it on the deck, or on a module there, before this step";
+                        return Err(not_expressible(at, headline, "this step moves it").help(help));
+                    };
+                    params.insert("labwareId".to_owned(), labware.id.clone().into());
+                }
+                Holds::Shift => {
+                    let shift = parsed(message, field, value)?;
+                    if let Some((of, axis)) = field.split_once('/')
+                        && shift != 0.0
+                    {
+                        let offset = params.entry(of).or_insert_with(|| json!({ "x": 0, "y": 0, "z": 0 }));
+                        offset[axis] = shift.into();
+                    }
+                }
+                Holds::Bin => {
+                    let Some(waste) = self.deck.waste(value) else {
+                        let headline =
+                            format!("`{value}` is no bin on the deck of `{}`", self.name(self.protocol.robot.device));
+                        let help = "place a bin on the deck: `bin = FlexTrash on flex.slot[A3]`";
+                        return Err(not_expressible(at, headline, "this step goes there").help(help));
+                    };
+                    let area = waste.area(message.get("channels").unwrap_or_default());
+                    if waste == Waste::Chute {
+                        name = "moveToAddressableArea";
+                    }
+                    params.insert("addressableAreaName".to_owned(), area.into());
+                }
+                Holds::Channels => {}
                 Holds::Definition => self.definition(value, device, &mut params)?,
             }
         }
         if !spot.is_empty() {
             params.insert("wellLocation".to_owned(), spot.into());
         }
-        Ok(Command { name: message.form.name, params, at })
+        if name == "moveToAddressableArea" {
+            params.remove("alternateDropLocation");
+        }
+        Ok(Command { name, params, at })
     }
 
     /// The place a command is about: where its first channel goes.
@@ -299,6 +349,11 @@ impl Writer<'_, '_> {
         }
         Ok(())
     }
+}
+
+/// Whether a place of the deck is one of those beside it, where labware waits.
+fn is_staging(slot: &str) -> bool {
+    matches!(slot, "A4" | "B4" | "C4" | "D4")
 }
 
 fn parsed(message: &Message<'_>, name: &str, value: &str) -> Result<f64, Diagnostic> {

@@ -82,6 +82,7 @@ enum Bound {
     Placed,
     /// Whether one mixture has touched something that another has not.
     Soils,
+    Spread,
     /// The activity of a species at equilibrium.
     Activity,
     /// Whether an equilibrium of the file has a species.
@@ -207,6 +208,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("placed", Bound::Placed),
     ("salts", Bound::Salts),
     ("soils", Bound::Soils),
+    ("spread", Bound::Spread),
     ("standing_height", Bound::StandingHeight),
     ("stated", Bound::Stated),
     ("max_over_time", Bound::OverTime(Keep::Largest)),
@@ -333,6 +335,7 @@ impl Elaborator<'_> {
             (Bound::Nth, [Value::List(items), Value::Num(n)]) => self.nth(items, n.node, at),
             (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
             (Bound::Grouped, [Value::List(items), Value::Num(n)]) => self.grouped(items, n.node, at),
+            (Bound::Spread, [Value::List(items), Value::Num(n)]) => self.spread(items, n.node, at),
             (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
             (Bound::Displacement, [Value::Frame(a, from), Value::Frame(b, to)]) => {
                 self.between_frames((*a, from), (*b, to))

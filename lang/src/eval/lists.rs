@@ -65,21 +65,39 @@ impl Elaborator<'_> {
 
     /// A list in groups of a whole number of elements; the last may have fewer.
     pub fn grouped(&mut self, items: &[Value], n: NodeId, at: Span) -> Value {
-        match self.number_before_run(n, "the size of a group", at) {
-            Decided::Now(size) if size >= 1.0 && size.fract() == 0.0 => {
-                Value::List(items.chunks(size as usize).map(|group| Value::List(group.to_vec())).collect())
+        match self.count_before_run(n, "the size of a group", at) {
+            Ok(Some(size)) => Value::List(items.chunks(size).map(|group| Value::List(group.to_vec())).collect()),
+            Ok(None) => Value::List(vec![Value::List(items.to_vec())]),
+            Err(()) => Value::Error,
+        }
+    }
+
+    /// A list with each of its elements a whole number of times.
+    pub fn spread(&mut self, items: &[Value], n: NodeId, at: Span) -> Value {
+        match self.count_before_run(n, "the number of times", at) {
+            Ok(times) => {
+                let each = |item: &Value| std::iter::repeat_n(item.clone(), times.unwrap_or(1)).collect::<Vec<_>>();
+                Value::List(items.iter().flat_map(each).collect())
             }
+            Err(()) => Value::Error,
+        }
+    }
+
+    /// A whole number from 1 that is known before the run; none in a prototype where it is known only later. What it is not is reported.
+    fn count_before_run(&mut self, n: NodeId, what: &str, at: Span) -> Result<Option<usize>, ()> {
+        match self.number_before_run(n, what, at) {
+            Decided::Now(size) if size >= 1.0 && size.fract() == 0.0 => Ok(Some(size as usize)),
             Decided::Now(_) => {
                 self.report(Diagnostic::error(
                     codes::TYPE_MISMATCH,
                     at,
-                    "the size of a group must be a whole number from 1",
+                    format!("{what} must be a whole number from 1"),
                     "not such a number",
                 ));
-                Value::Error
+                Err(())
             }
-            Decided::Later if self.prototype => Value::List(vec![Value::List(items.to_vec())]),
-            Decided::Later | Decided::ByRun => Value::Error,
+            Decided::Later if self.prototype => Ok(None),
+            Decided::Later | Decided::ByRun => Err(()),
         }
     }
 

@@ -80,14 +80,8 @@ pub(super) enum Opening {
 }
 
 impl Opening {
-    /// From front to back.
-    pub(super) fn across(self) -> f64 {
-        match self {
-            Opening::Round(across) | Opening::Square([_, across]) => across,
-        }
-    }
-
-    fn sizes(self) -> [f64; 2] {
+    /// From left to right and from front to back.
+    pub(super) fn sizes(self) -> [f64; 2] {
         match self {
             Opening::Round(across) => [across; 2],
             Opening::Square(sizes) => sizes,

@@ -105,7 +105,10 @@ impl<'d> Writer<'d> {
         if self.definition.has_tips {
             fields.extend(well.reach.map(|reach| self.field("reach", self.quantity(reach, "mm"))));
         } else {
-            fields.extend(well.opening.map(|opening| self.field("mouth", self.quantity(opening.across(), "mm"))));
+            let sides = well.opening.map(Opening::sizes);
+            fields.extend(sides.map(|[_, deep]| self.field("mouth", self.quantity(deep, "mm"))));
+            let oblong = sides.filter(|[wide, deep]| wide != deep);
+            fields.extend(oblong.map(|[wide, _]| self.field("breadth", self.quantity(wide, "mm"))));
         }
         let ty = Path { segments: vec![self.name(kind)], span: self.at };
         Some(Grid {
