@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::robot::Robot;
 use crate::Mistake;
 
 /// The file.
@@ -20,7 +21,7 @@ pub(super) struct Analysis {
     #[serde(default)]
     robot_type: Option<String>,
     #[serde(default)]
-    robot: Option<Robot>,
+    robot: Option<Model>,
     /// Liquids: a list in an analysis, by identifier in a protocol.
     #[serde(default)]
     liquids: Value,
@@ -30,7 +31,7 @@ pub(super) struct Analysis {
 }
 
 #[derive(Debug, Deserialize)]
-struct Robot {
+struct Model {
     #[serde(default)]
     model: String,
 }
@@ -64,14 +65,21 @@ impl Analysis {
             let why = format!("the protocol fails in its analysis: {}", trouble.detail.replace('\n', " "));
             return Err(Mistake { line: 0, why });
         }
-        let robot = read.robot_type.as_deref().or(read.robot.as_ref().map(|r| r.model.as_str()));
-        if let Some(robot) = robot.filter(|robot| !robot.starts_with("OT-2")) {
-            return Err(Mistake {
-                line: 0,
-                why: format!("it is for `{robot}`; only protocols of the OT-2 are imported"),
-            });
+        if let Some(model) = read.model().filter(|model| Robot::named(model).is_none()) {
+            let why = format!("it is for `{model}`; only protocols of the OT-2 and of the Flex are imported");
+            return Err(Mistake { line: 0, why });
         }
         Ok(read)
+    }
+
+    /// What it calls its robot.
+    fn model(&self) -> Option<&str> {
+        self.robot_type.as_deref().or(self.robot.as_ref().map(|r| r.model.as_str()))
+    }
+
+    /// Its robot; the OT-2 where it names none.
+    pub(super) fn robot(&self) -> Robot {
+        self.model().and_then(Robot::named).unwrap_or_default()
     }
 
     /// The name of a liquid.

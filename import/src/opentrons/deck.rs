@@ -9,6 +9,7 @@ use super::analysis::{Analysis, Command};
 use super::library::{Library, Pipette};
 use super::liquids::Reach;
 use super::node::{At, Place, cell};
+use super::robot::{Bins, Robot};
 use super::words;
 
 /// The name space of definitions that come with Opentrons' software.
@@ -26,6 +27,9 @@ const SUCTION: f64 = 1.0;
 
 /// How far apart channels are, mm.
 const PITCH: f64 = 9.0;
+
+/// So many channels stand in a row from back to front at most.
+const ROWS: usize = 8;
 
 /// What a piece of labware is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +51,7 @@ pub(super) struct Well {
     pub(super) depth: f64,
     opening: Opening,
     /// What it holds, uL.
-    capacity: f64,
+    pub(super) capacity: f64,
     x: f64,
     y: f64,
 }
@@ -97,8 +101,14 @@ impl Labware {
     /// The well over which each of so many channels in a row is, if any, where the first one is over the middle of this well.
     pub(super) fn row(&self, channels: usize, well: &str) -> Vec<Option<&str>> {
         let Some(first) = self.wells.get(well) else { return vec![None; channels] };
+        self.under(channels, [first.x, first.y])
+    }
+
+    /// The same where the first one is at a place.
+    fn under(&self, channels: usize, [x, y]: [f64; 2]) -> Vec<Option<&str>> {
         let at = |channel: usize| {
-            let (x, y) = (first.x, first.y - PITCH * channel as f64);
+            let (column, row) = (channel / ROWS, channel % ROWS);
+            let (x, y) = (x + PITCH * column as f64, y - PITCH * row as f64);
             self.order.iter().find(|other| self.wells.get(*other).is_some_and(|o| o.opens_at(x, y))).map(String::as_str)
         };
         (0..channels).map(at).collect()
@@ -123,6 +133,8 @@ pub(super) struct Module {
 /// Everything that is loaded.
 #[derive(Debug, Default)]
 pub(super) struct Deck {
+    pub(super) robot: Robot,
+    pub(super) bins: Bins,
     pub(super) labware: BTreeMap<String, Labware>,
     pub(super) pipettes: BTreeMap<String, Mounted>,
     pub(super) modules: BTreeMap<String, Module>,
@@ -139,10 +151,11 @@ pub(super) struct Deck {
 }
 
 impl Deck {
-    /// An empty deck; these names are taken.
-    pub(super) fn new(taken: &[&str]) -> Deck {
-        let names = taken.iter().map(|name| (*name).to_owned()).collect();
-        Deck { names, ..Deck::default() }
+    /// An empty deck of a robot; these names are taken.
+    pub(super) fn new(robot: Robot, bins: Bins, taken: &[&str]) -> Deck {
+        let taken = taken.iter().copied().chain([robot.name()]).chain(bins.all().map(|bin| bin.name.as_str()));
+        let names = taken.map(str::to_owned).collect();
+        Deck { robot, bins, names, ..Deck::default() }
     }
 
     /// Loads what a command loads; why it cannot be.
@@ -159,10 +172,11 @@ impl Deck {
             "loadModule" => {
                 let model = command.text("model");
                 let model = command.result["model"].as_str().unwrap_or(model);
-                let asset = library.module(model).ok_or_else(|| format!("the library has no module `{model}`"))?;
+                let asset =
+                    library.module(model, self.robot).ok_or_else(|| format!("the library has no module `{model}`"))?;
                 let name = words::name_of(module_word(model), "module", &mut self.names);
                 self.used.insert(asset.to_owned());
-                let slot = slot(&command.params["location"]).unwrap_or_else(|| "7".to_owned());
+                let slot = slot(&command.params["location"]).unwrap_or_else(|| self.robot.cycler().to_owned());
                 let id = command.loaded("moduleId").unwrap_or(model).to_owned();
                 self.loaded.push(id.clone());
                 self.modules.insert(id, Module { name, asset: asset.to_owned(), slot });
@@ -231,7 +245,7 @@ impl Deck {
             return Ok(ASIDE.to_owned());
         }
         if let Some(slot) = slot(location) {
-            return Ok(format!("ot2.slot[{slot}]"));
+            return Ok(format!("{}.slot[{slot}]", self.robot.name()));
         }
         if let Some(module) = location["moduleId"].as_str().and_then(|id| self.modules.get(id)) {
             return Ok(module.name.clone());
@@ -246,6 +260,9 @@ impl Deck {
     pub(super) fn reached(&self, channels: usize, labware: &Labware, well: &str) -> Result<Place, String> {
         let of = labware.name.clone();
         let at = |at| Ok(Place { of: of.clone(), at });
+        if channels > ROWS {
+            return self.reached_by_rows(channels, labware, well);
+        }
         if !labware.wells.contains_key(well) {
             return Err(format!("`{of}` has no well {well}"));
         }
@@ -262,6 +279,35 @@ impl Deck {
             Some((1, number)) if reached == labware.column(well) => at(At::Column(number as usize, labware.columns())),
             _ => at(At::Wells(reached.into_iter().map(str::to_owned).collect())),
         }
+    }
+
+    /// The same of several rows of channels: all wells over which any is.
+    fn reached_by_rows(&self, channels: usize, labware: &Labware, well: &str) -> Result<Place, String> {
+        let of = labware.name.clone();
+        let Some(first) = labware.wells.get(well) else { return Err(format!("`{of}` has no well {well}")) };
+        // Where the middle of all channels goes to the middle of a well, in both directions or from back to front.
+        let half = |channels: usize| PITCH * (channels - 1) as f64 / 2.0;
+        let [left, back] = match (labware.is_centred, labware.columns()) {
+            (false, _) => [0.0, 0.0],
+            (true, 1) => [half(channels / ROWS), half(ROWS)],
+            (true, _) => [0.0, half(ROWS)],
+        };
+        let under = labware.under(channels, [first.x - left, first.y + back]);
+        let Some(under) = under.into_iter().collect::<Option<Vec<&str>>>() else {
+            return Err("some of its channels reach no well".to_owned());
+        };
+        let mut wells: Vec<String> = Vec::new();
+        for one in under {
+            if !wells.iter().any(|known| known == one) {
+                wells.push(one.to_owned());
+            }
+        }
+        let at = match wells.as_slice() {
+            [one] => At::Well(one.clone()),
+            all if *all == labware.order => At::All(labware.kind == Kind::Tips),
+            _ => At::Wells(wells),
+        };
+        Ok(Place { of, at })
     }
 
     /// The labware that has a name here.
@@ -286,6 +332,7 @@ impl Deck {
         match &place.at {
             At::Well(well) => vec![well.clone()],
             At::Wells(wells) => wells.clone(),
+            At::All(_) => self.named(&place.of).map_or(Vec::new(), |labware| labware.order.clone()),
             At::Column(number, _) => {
                 let order = self.named(&place.of).map_or(&[][..], |labware| &labware.order);
                 order.iter().filter(|w| cell(w).is_some_and(|(_, c)| c as usize == *number)).cloned().collect()
@@ -295,7 +342,8 @@ impl Deck {
 }
 
 fn slot(location: &Value) -> Option<String> {
-    location["slotName"].as_str().map(str::to_owned)
+    let area = || location["addressableAreaName"].as_str().filter(|area| area.len() == 2);
+    location["slotName"].as_str().or_else(area).map(str::to_owned)
 }
 
 fn wells(definition: &Value) -> BTreeMap<String, Well> {

@@ -1,4 +1,4 @@
-//! Protocols of Opentrons' OT-2: analyses of them, and JSON protocols.
+//! Protocols of Opentrons' OT-2 and Flex: analyses of them, and JSON protocols.
 //!
 //! An analysis lists the commands that a protocol would run, whatever the Python says; this makes a lab and steps of them, and loops of steps
 //! that repeat. It does not say what wells hold where the protocol does not: they hold water then, as much as is aspirated.
@@ -8,6 +8,7 @@ mod deck;
 mod library;
 mod liquids;
 mod node;
+mod robot;
 mod steps;
 mod tips;
 mod words;
@@ -24,6 +25,7 @@ use deck::{Deck, Kind};
 use library::Library;
 use liquids::{Holding, Liquids};
 use node::{cell, folded};
+use robot::{Bins, Robot};
 use steps::Steps;
 use words::number;
 
@@ -38,7 +40,9 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
         return Err(Mistake { line: 0, why });
     }
     let library = Library::read();
-    let mut deck = Deck::new(&["ot2", deck::ASIDE, "deck", "way", "well", "column"]);
+    let robot = analysis.robot();
+    let bins = Bins::of(robot, &analysis.commands);
+    let mut deck = Deck::new(robot, bins, &[deck::ASIDE, "deck", "way", "well", "column"]);
     let mut left_out = Vec::new();
     for (index, command) in analysis.commands.iter().enumerate() {
         if matches!(command.command_type.as_str(), "loadPipette" | "loadModule" | "loadLabware")
@@ -58,7 +62,16 @@ pub fn import(text: &str, title: &str) -> Result<Imported, Mistake> {
     let nodes = std::mem::take(&mut steps.nodes);
     let leaves = |c: &Command| c.command_type == "moveLabware" && c.params["newLocation"] == deck::OFF;
     let has_aside = deck.labware.values().any(|l| l.on == deck::ASIDE) || analysis.commands.iter().any(leaves);
-    let page = Page { deck: &deck, flows: &flows, holding: &holding, parked: &parked(&analysis), has_aside };
+    let has_gripper = analysis.commands.iter().any(|c| c.text("strategy") == steps::BY_GRIPPER);
+    let page = Page {
+        library: &library,
+        has_gripper,
+        deck: &deck,
+        flows: &flows,
+        holding: &holding,
+        parked: &parked(&analysis),
+        has_aside,
+    };
     let text = page.text(&analysis, title, &folded(nodes));
     let text = format(FileId(0), &text).map_err(|found| {
         let why = found.first().map_or_else(String::new, |d| d.headline.clone());
@@ -72,6 +85,10 @@ fn flows(analysis: &Analysis, deck: &Deck) -> BTreeMap<String, [f64; 3]> {
     let mut out = BTreeMap::new();
     for (id, mounted) in &deck.pipettes {
         let mut flows = mounted.pipette.flows(None);
+        // What is usual depends on the tips of a pipette of the Flex.
+        if mounted.pipette.is_flex {
+            continue;
+        }
         for (which, name) in ["aspirate", "dispense", "blowout"].iter().enumerate() {
             if which == 1 {
                 flows = mounted.pipette.flows(Some(flows[0]));
@@ -132,6 +149,9 @@ fn holding(steps: &Steps<'_>, commands: &[Command], deck: &Deck) -> Holding {
 
 /// The file on its way.
 struct Page<'p> {
+    library: &'p Library,
+    /// Whether a gripper moves labware.
+    has_gripper: bool,
     deck: &'p Deck,
     flows: &'p BTreeMap<String, [f64; 3]>,
     holding: &'p Holding,
@@ -147,11 +167,24 @@ impl Page<'_> {
         let name = analysis.metadata.get("protocolName").and_then(|n| n.as_str()).unwrap_or(title);
         let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
         let _ = writeln!(out, "//! {name}. Imported from {title}.\n");
-        let used: BTreeSet<&str> = self.deck.used.iter().map(String::as_str).chain(["OT2", "TrashBin"]).collect();
-        if self.has_aside {
-            out.push_str("use std::furniture::LabBench\n");
+        let robot = self.deck.robot;
+        let more = match robot {
+            Robot::Ot2 => vec!["TrashBin"],
+            Robot::Flex => {
+                self.deck.bins.all().map(|bin| bin.asset).chain(self.has_gripper.then_some("FlexGripper")).collect()
+            }
+        };
+        let used = self.deck.used.iter().map(String::as_str).chain([robot.asset()]).chain(more);
+        let (flex, shared): (BTreeSet<&str>, BTreeSet<&str>) = used.partition(|asset| self.library.is_of_flex(asset));
+        for (module, used) in [("flex", flex), ("opentrons", shared)] {
+            if module == "opentrons" && self.has_aside {
+                out.push_str("use std::furniture::LabBench\n");
+            }
+            if !used.is_empty() {
+                let _ = writeln!(out, "use std::{module}::{{{}}}", used.into_iter().collect::<Vec<_>>().join(", "));
+            }
         }
-        let _ = writeln!(out, "use std::opentrons::{{{}}}\n", used.into_iter().collect::<Vec<_>>().join(", "));
+        out.push('\n');
         for (asset, from) in &self.deck.assets {
             let _ = writeln!(out, "asset {asset} from labware \"{from}\"");
         }
@@ -183,7 +216,7 @@ impl Page<'_> {
     }
 
     fn lab(&self, liquids: &BTreeMap<String, String>, out: &mut String) {
-        let mounts: Vec<String> = self
+        let mut mounts: Vec<String> = self
             .deck
             .pipettes
             .iter()
@@ -199,13 +232,23 @@ impl Page<'_> {
                 format!("{}: {}{}", mounted.mount, mounted.pipette.asset, words::braced(&other))
             })
             .collect();
-        let _ = writeln!(out, "ot2 = OT2{} at (0, 0, 0) m", words::braced(&mounts));
+        let robot = self.deck.robot;
+        mounts.extend(self.has_gripper.then(|| "gripper: FlexGripper".to_owned()));
+        mounts.extend(self.deck.bins.usual().map(|bin| format!("trash: {bin}")));
+        let _ = writeln!(out, "{} = {}{} at (0, 0, 0) m", robot.name(), robot.asset(), words::braced(&mounts));
+        for bin in self.deck.bins.all() {
+            let place = match &bin.slot {
+                Some(slot) => format!("on {}.slot[{slot}]", robot.name()),
+                None => "at (1.5, 0, 0) m".to_owned(),
+            };
+            let _ = writeln!(out, "{} = {} {place}", bin.name, bin.asset);
+        }
         if self.has_aside {
             let _ = writeln!(out, "{} = LabBench at (0, -1.5, 0) m", deck::ASIDE);
         }
         for id in &self.deck.loaded {
             if let Some(module) = self.deck.modules.get(id) {
-                let _ = writeln!(out, "{} = {} on ot2.slot[{}]", module.name, module.asset, module.slot);
+                let _ = writeln!(out, "{} = {} on {}.slot[{}]", module.name, module.asset, robot.name(), module.slot);
             }
             let Some(labware) = self.deck.labware.get(id) else { continue };
             let holding = match labware.kind {

@@ -33,6 +33,8 @@ pub(super) enum At {
     Column(usize, usize),
     /// `[A1, C1, E1]`: what several channels reach that is no column.
     Wells(Vec<String>),
+    /// All of them, and whether those are tips.
+    All(bool),
 }
 
 impl Place {
@@ -47,6 +49,8 @@ impl std::fmt::Display for Place {
         match &self.at {
             At::Well(well) => write!(f, "{of}[{well}]"),
             At::Column(number, _) => write!(f, "{of}.column({number})"),
+            At::All(true) => write!(f, "{of}.tips"),
+            At::All(false) => write!(f, "{of}.wells"),
             At::Wells(wells) => {
                 let all: Vec<String> = wells.iter().map(|well| format!("{of}[{well}]")).collect();
                 write!(f, "[{}]", all.join(", "))

@@ -24,8 +24,8 @@ const TOUCH: f64 = -1.0;
 /// What is switched off without having been on is switched off as a precaution.
 const ANYWAY: &str = " { anyway: true }";
 
-/// How commands call the bin.
-const TRASH: &str = "fixedTrash";
+/// How commands say that the gripper moves labware.
+pub(super) const BY_GRIPPER: &str = "usingGripper";
 
 /// Commands on their way to steps.
 pub(super) struct Steps<'a> {
@@ -44,6 +44,12 @@ pub(super) struct Steps<'a> {
     refills: Refills,
     /// How many channels of a pipette have tips, where it has any.
     tips: BTreeMap<String, usize>,
+    /// What its tips take, uL.
+    sizes: BTreeMap<String, f64>,
+    /// Pipettes with a layout of nozzles that is not imported.
+    parted: BTreeSet<String>,
+    /// By pipette: the bin that it was brought over.
+    aimed: BTreeMap<String, String>,
     /// What modules were set to last, degC.
     targets: BTreeMap<String, f64>,
     /// Numbers of the commands that set modules which stay on at the end.
@@ -93,6 +99,9 @@ impl<'a> Steps<'a> {
             absent: BTreeMap::new(),
             refills: Refills::new(),
             tips: BTreeMap::new(),
+            sizes: BTreeMap::new(),
+            parted: BTreeSet::new(),
+            aimed: BTreeMap::new(),
             targets: BTreeMap::new(),
             staying: staying(&analysis.commands),
             at: 0,
@@ -133,13 +142,23 @@ impl<'a> Steps<'a> {
         let text = |name: &str| command.text(name);
         match command.command_type.as_str() {
             "pickUpTip" => self.pick_up(command),
-            "dropTip" if text("labwareId") == TRASH => self.drop(command),
+            "dropTip" if self.deck.bins.is_one(text("labwareId")) => self.drop(command, text("labwareId")),
             "dropTip" => self.give_back(command),
             // The drop that follows says it.
-            "moveToAddressableAreaForDropTip" | "moveToAddressableArea" if text("addressableAreaName") == TRASH => {
+            "moveToAddressableAreaForDropTip" | "moveToAddressableArea"
+                if self.deck.bins.get(text("addressableAreaName")).is_some() =>
+            {
+                self.aimed.insert(text("pipetteId").to_owned(), text("addressableAreaName").to_owned());
                 Ok(())
             }
-            "dropTipInPlace" => self.drop(command),
+            "dropTipInPlace" => match self.aimed.remove(text("pipetteId")) {
+                Some(area) => self.drop(command, &area),
+                None => Err("it is not at a bin".to_owned()),
+            },
+            "dispenseInPlace" | "blowOutInPlace" => self.give_in_place(command),
+            "configureNozzleLayout" => self.lay_out(command),
+            // The plunger goes to its start; what the tip does next says so.
+            "prepareToAspirate" => Ok(()),
             "aspirate" | "dispense" if command.number("volume") == Some(0.0) => self.move_to(command),
             "aspirate" => self.aspirate(command),
             "dispense" => self.dispense(command),
@@ -161,7 +180,10 @@ impl<'a> Steps<'a> {
                 Ok(())
             }
             "home" => self.home(command),
-            "setRailLights" => self.say(if command.params["on"] == true { "light ot2" } else { "dim ot2" }),
+            "setRailLights" => {
+                let verb = if command.params["on"] == true { "light" } else { "dim" };
+                self.say(format!("{verb} {}", self.deck.robot.name()))
+            }
             "setTipState" => self.refill(command),
             "moveLabware" => self.relocate(command),
             "loadLabware" => self.brought(command),
@@ -178,7 +200,7 @@ impl<'a> Steps<'a> {
 
     fn pipette(&self, command: &Command) -> Result<(&'a Mounted, String), String> {
         let mounted = self.deck.pipettes.get(command.text("pipetteId")).ok_or("its pipette is not imported")?;
-        Ok((mounted, format!("ot2.{}", mounted.mount)))
+        Ok((mounted, format!("{}.{}", self.deck.robot.name(), mounted.mount)))
     }
 
     /// How many of its tips work at once; where it has none, all its channels.
@@ -215,12 +237,36 @@ impl<'a> Steps<'a> {
         Ok(Spot { place, above, depth })
     }
 
+    /// The flow rates of a pipette that hold where a step says nothing, uL/s.
+    fn usual(&self, id: &str) -> Option<[f64; 3]> {
+        let of_tips = || {
+            let mounted = self.deck.pipettes.get(id).filter(|mounted| mounted.pipette.is_flex)?;
+            Some(mounted.pipette.flows_with(*self.sizes.get(id)?))
+        };
+        self.flows.get(id).copied().or_else(of_tips)
+    }
+
+    /// All nozzles take tips, or some.
+    fn lay_out(&mut self, command: &Command) -> Result<(), String> {
+        let id = command.text("pipetteId");
+        match command.params["configurationParams"]["style"].as_str() {
+            Some("ALL") => {
+                self.parted.remove(id);
+                Ok(())
+            }
+            _ => {
+                self.parted.insert(id.to_owned());
+                Err("the language has no layouts of some nozzles".to_owned())
+            }
+        }
+    }
+
     /// Options of a step, in braces.
     fn options(&self, command: &Command, flow: Option<Flow>, more: &[String]) -> String {
         let mut all: Vec<String> = more.to_vec();
         let rate = command.number("flowRate");
         if let (Some(flow), Some(rate)) = (flow, rate)
-            && let Some(usual) = self.flows.get(command.text("pipetteId")).map(|flows| flows[flow as usize])
+            && let Some(usual) = self.usual(command.text("pipetteId")).map(|flows| flows[flow as usize])
             && (rate - usual).abs() > 1e-9 * usual
         {
             all.push(format!("rate: {} uL/s", number(rate)));
@@ -245,6 +291,9 @@ impl<'a> Steps<'a> {
     fn pick_up(&mut self, command: &Command) -> Result<(), String> {
         let (mounted, by) = self.pipette(command)?;
         let (id, rack, well) = (command.text("pipetteId"), command.text("labwareId"), command.text("wellName"));
+        if self.parted.contains(id) {
+            return Err("some of its nozzles take tips, and that is not imported".to_owned());
+        }
         let labware = self.deck.labware.get(rack).ok_or("its rack is not imported")?;
         if labware.kind != Kind::Tips {
             return Err(format!("`{}` is not a tip rack", labware.name));
@@ -271,6 +320,8 @@ impl<'a> Steps<'a> {
             && taken.len().is_multiple_of(wells.len());
         taken.extend(wells);
         self.tips.insert(id.to_owned(), tips);
+        self.sizes.insert(id.to_owned(), labware.wells.get(well).map_or(0.0, |tip| tip.capacity));
+        self.aimed.remove(id);
         self.liquids.empty(id);
         self.moved.remove(id);
         match in_order {
@@ -282,10 +333,34 @@ impl<'a> Steps<'a> {
         }
     }
 
-    fn drop(&mut self, command: &Command) -> Result<(), String> {
+    fn drop(&mut self, command: &Command, bin: &str) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
+        let (bin, is_usual) = self.deck.bins.get(bin).ok_or("its bin is not imported")?;
         self.bare(command);
-        self.say(format!("drop tip by {by}"))
+        let into = if is_usual { String::new() } else { format!(" into {bin}") };
+        self.say(format!("drop tip{into} by {by}"))
+    }
+
+    /// What is dispensed or blown out over a bin, to which the pipette was brought.
+    fn give_in_place(&mut self, command: &Command) -> Result<(), String> {
+        let id = command.text("pipetteId");
+        let (_, by) = self.pipette(command)?;
+        let Some((bin, _)) = self.aimed.get(id).and_then(|area| self.deck.bins.get(area)) else {
+            return Err("it is done at the position of the tip, which is not at a bin".to_owned());
+        };
+        let blows = command.command_type == "blowOutInPlace";
+        let flow = if blows { Flow::Blow } else { Flow::Out };
+        let options = self.options(command, Some(flow), &[]);
+        match blows {
+            true => {
+                self.liquids.blow_out(id, "", &[]);
+                self.say(format!("blow out into {bin}[A1] by {by}{options}"))
+            }
+            false => {
+                self.liquids.dispense(id, command.volume(), "", &[]);
+                self.say(format!("dispense {} uL into {bin}[A1] by {by}{options}", number(command.volume())))
+            }
+        }
     }
 
     /// A pipette has no tips any more.
@@ -315,9 +390,11 @@ impl<'a> Steps<'a> {
         let location = &command.params["wellLocation"];
         let is_above = location["origin"] == "top" && location["offset"]["z"].as_f64().is_none_or(|z| z > -DUST);
         // Above the bin there is nothing but air.
-        if command.text("labwareId") == TRASH && is_above {
+        if let Some((bin, _)) = self.deck.bins.get(command.text("labwareId"))
+            && is_above
+        {
             self.moved.remove(id);
-            self.nodes.push(Node::plain(format!("move {by} to ot2.trash[A1]")));
+            self.nodes.push(Node::plain(format!("move {by} to {bin}[A1]")));
             return self.air_gap(command, &by);
         }
         let spot = self.spot(command)?;
@@ -368,9 +445,9 @@ impl<'a> Steps<'a> {
     ) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
         let options = self.options(command, Some(flow), &[]);
-        if command.text("labwareId") == TRASH {
+        if let Some((bin, _)) = self.deck.bins.get(command.text("labwareId")) {
             pass(&mut self.liquids, "", &[]);
-            return self.say(format!("{before}ot2.trash[A1] by {by}{options}"));
+            return self.say(format!("{before}{bin}[A1] by {by}{options}"));
         }
         let spot = self.spot(command)?;
         pass(&mut self.liquids, &spot.place.of, &self.deck.wells_of(&spot.place));
@@ -441,15 +518,17 @@ impl<'a> Steps<'a> {
     }
 
     fn home(&mut self, command: &Command) -> Result<(), String> {
-        let Some(axes) = command.params["axes"].as_array() else { return self.say("home ot2") };
+        let Some(axes) = command.params["axes"].as_array() else {
+            return self.say(format!("home {}", self.deck.robot.name()));
+        };
         let axes: BTreeSet<&str> = axes.iter().filter_map(Value::as_str).collect();
         for mount in ["left", "right"] {
             let [up, plunger] = ["Z", "Plunger"].map(|axis| format!("{mount}{axis}"));
             if axes == BTreeSet::from([up.as_str(), plunger.as_str()]) {
-                return self.say(format!("home ot2.{mount}"));
+                return self.say(format!("home {}.{mount}", self.deck.robot.name()));
             }
             if axes == BTreeSet::from([plunger.as_str()]) {
-                return self.say(format!("home plunger ot2.{mount}"));
+                return self.say(format!("home plunger {}.{mount}", self.deck.robot.name()));
             }
         }
         let axes: Vec<&str> = axes.into_iter().collect();
@@ -470,7 +549,26 @@ impl<'a> Steps<'a> {
     /// A person puts labware in another place.
     fn relocate(&mut self, command: &Command) -> Result<(), String> {
         let labware = self.deck.labware.get(command.text("labwareId")).ok_or("its labware is not imported")?;
+        let chute = command.params["newLocation"]["addressableAreaName"].as_str();
+        let by_gripper = command.text("strategy") == BY_GRIPPER;
+        if let Some((bin, _)) = chute.and_then(|area| self.deck.bins.get(area)) {
+            let by = if by_gripper { format!(" by {}.gripper", self.deck.robot.name()) } else { String::new() };
+            return self.say(format!("dispose {} into {bin}{by}", labware.name));
+        }
         let place = self.deck.place_of(&command.params["newLocation"])?;
+        if by_gripper {
+            let mut shifts = Vec::new();
+            for (key, word) in [("pickUpOffset", "pick"), ("dropOffset", "drop")] {
+                for axis in ["x", "y", "z"] {
+                    let shift = command.params[key][axis].as_f64().unwrap_or(0.0);
+                    if shift.abs() > DUST {
+                        shifts.push(format!("{word}_{axis}: {} mm", number(shift)));
+                    }
+                }
+            }
+            let (by, options) = (format!("{}.gripper", self.deck.robot.name()), words::braced(&shifts));
+            return self.say(format!("relocate {} to {place} by {by}{options}", labware.name));
+        }
         let verb = match command.text("strategy") {
             "manualMoveWithPause" => "relocate",
             "manualMoveWithoutPause" => "moved",
