@@ -27,13 +27,14 @@ BIN = "bin"
 class Reader:
     """Reads the commands of an analysis one after the other."""
 
-    def __init__(self):
+    def __init__(self, robot):
         self.labware, self.pipettes, self.modules = {}, {}, {}
         self.at = {}  # by mount: where the tip is
         self.aimed = {}  # by mount: the area it was moved over
         self.targets = {}  # by module: what it was set to
         self.holds = {}  # by module: for how long it holds that, once it is there
         self.lids = {}
+        self.robot = robot
         self.out = []
 
     def say(self, verb, *what):
@@ -65,12 +66,18 @@ class Reader:
             slot = "7" if "thermocycler" in params["model"] else str(params["location"]["slotName"])
             self.modules[result["moduleId"]] = f"{params['model']} on {slot}"
 
+    def bin(self, area):
+        """What an area is called. Where no bin is loaded, that of a Flex stands in place A3."""
+        if area == "fixedTrash":
+            return BIN if self.robot.startswith("OT-2") else "movableTrashA3"
+        return area
+
     def spot(self, params):
         """Labware, well, and where in it: from its axis and its bottom, mm."""
         labware = self.labware.get(params["labwareId"])
         if labware is None or labware["where"] == BIN:
             # Wherever in the bin: it takes everything.
-            return (BIN,)
+            return (self.bin("fixedTrash"),)
         well = labware["wells"][params["wellName"]]
         location = params.get("wellLocation") or {}
         offset = {"x": 0, "y": 0, "z": 0, **(location.get("offset") or {})}
@@ -95,19 +102,19 @@ class Reader:
         match kind:
             case "pickUpTip" | "dropTip":
                 spot = self.spot(params)
-                if spot == (BIN,):
-                    self.say("drop tip", mount)
+                if len(spot) == 1:
+                    self.say("drop tip", mount, spot)
                 else:
                     # A tip is picked up and given back in one way only.
                     self.say("pick up tip" if kind == "pickUpTip" else "return tip", mount, *spot[:2])
                 self.at.pop(mount, None)
             case "moveToAddressableAreaForDropTip" | "moveToAddressableArea":
                 self.aimed[mount] = params["addressableAreaName"]
-                self.at[mount] = (BIN if "rash" in params["addressableAreaName"] else params["addressableAreaName"],)
+                self.at[mount] = (self.bin(params["addressableAreaName"]),)
                 if kind == "moveToAddressableArea":
                     self.say("move", mount, self.at[mount], None, False, None)
             case "dropTipInPlace":
-                self.say("drop tip", mount) if self.at.get(mount) == (BIN,) else self.say("drop tip here", mount)
+                self.say("drop tip", mount, self.at.get(mount))
                 self.at.pop(mount, None)
             case "aspirate" | "dispense" | "blowout":
                 self.at[mount] = self.spot(params)
@@ -142,6 +149,9 @@ class Reader:
                 self.at.clear()
             case "setRailLights":
                 self.say("lights", params["on"])
+            case "configureNozzleLayout" if params["configurationParams"]["style"] == "ALL":
+                # All nozzles take tips, as without it.
+                pass
             case "prepareToAspirate":
                 # The plunger goes to its start; what the tip does next says so.
                 pass
@@ -153,7 +163,9 @@ class Reader:
                 before = where["where"]
                 to = self.on(params["newLocation"])
                 where["where"] = f"{before.split(' on ')[0]} on {to}"
-                self.say("move labware", before, to, params["strategy"])
+                offsets = (params.get(key) or {} for key in ("pickUpOffset", "dropOffset"))
+                shifts = (float(offset.get(axis, 0)) for offset in offsets for axis in "xyz")
+                self.say("move labware", before, to, params["strategy"], *shifts)
             case "temperatureModule/setTargetTemperature" | "temperatureModule/waitForTemperature":
                 # A wait without a temperature is for the one that was set.
                 module = self.modules[params["moduleId"]]
@@ -213,9 +225,13 @@ def frozen(value):
     return value
 
 
+def robot_of(analysis):
+    return analysis.get("robotType") or "OT-2 Standard"
+
+
 def deeds(analysis):
     """What an analysis does."""
-    reader = Reader()
+    reader = Reader(robot_of(analysis))
     for command in analysis["commands"]:
         reader.take(command)
     out = list(itertools.dropwhile(lambda deed: deed[0] == "home", reader.out))
@@ -256,7 +272,7 @@ def volumes(analysis):
 def flows(analysis):
     """What comes into and leaves wells, one after the other: well and volume, uL. What is aspirated above a rim is air, and the
     air that came in last comes out first."""
-    reader, tips = Reader(), {}
+    reader, tips = Reader(robot_of(analysis)), {}
     for command in analysis["commands"]:
         seen = len(reader.out)
         reader.take(command)
@@ -287,15 +303,28 @@ def flows(analysis):
             if not labware or not change:
                 continue
             names = (name for m, name in reader.pipettes.values() if m == mount)
-            channels = 8 if any("multi" in name for name in names) else 1
+            channels = max(map(channels_of, names), default=1)
             for well in reached(labware, spot[1], channels):
                 yield (labware["where"], well), change
+
+
+def channels_of(pipette):
+    """How many channels a pipette has, by its name."""
+    return 96 if pipette.endswith("_96") else 8 if "multi" in pipette else 1
 
 
 def reached(labware, well, channels):
     """The wells that channels 9 mm apart reach, one for each of them."""
     wells = labware["wells"]
     first = wells[well]
+    if channels == 96:
+        # Twelve columns, over one trough, over troughs, or over wells.
+        rows = {round(w["x"], 1): name for name, w in wells.items()}
+        if len(rows) == 1:
+            return [well] * channels
+        beside = (first["x"] + 9.0 * column for column in range(12))
+        near = (min(wells, key=lambda name: abs(wells[name]["x"] - x) + abs(wells[name]["y"] - first["y"])) for x in beside)
+        return [name for start in near for name in reached(labware, start, 8)]
     column = [name for name, w in wells.items() if abs(w["x"] - first["x"]) < 0.1]
     if channels == 1 or len(column) == 1:
         return [well] * channels

@@ -13,13 +13,13 @@ import importlib.resources
 import json
 import re
 
-from corpus_compare import Reader, flows
+from corpus_compare import Reader, channels_of, flows, robot_of
 
 #: What rounding may leave, uL.
 DUST = 1e-6
 #: How far apart channels are, mm.
 PITCH = 9.0
-CHANNELS = 8
+ROWS = 8
 #: Commands that go to a well.
 AT_WELLS = {"aspirate", "dispense", "blowout", "touchTip", "moveToWell"}
 
@@ -27,7 +27,7 @@ AT_WELLS = {"aspirate", "dispense", "blowout", "touchTip", "moveToWell"}
 def faults(analysis):
     """Kinds of faults with the well of each, such as ("overflow", well)."""
     capacity = {}
-    reader = Reader()
+    reader = Reader(robot_of(analysis))
     for command in analysis["commands"]:
         if command["commandType"] in ("loadLabware", "loadModule"):
             reader.load(command["commandType"], command["params"], command.get("result") or {})
@@ -56,7 +56,7 @@ def faults(analysis):
 
 def channels(analysis):
     """Faults about tips, and the numbers of commands in which a channel with a tip is over no well."""
-    reader, absent, tips = Reader(), set(), {}
+    reader, absent, tips = Reader(robot_of(analysis)), set(), {}
     found, beside, parking = set(), set(), parked(analysis)
     for number, command in enumerate(analysis["commands"], 1):
         kind, params = command["commandType"], command["params"]
@@ -73,7 +73,7 @@ def channels(analysis):
             continue
         labware, well = reader.labware[params["labwareId"]], params["wellName"]
         parameters = labware["definition"]["parameters"]
-        many = CHANNELS if "multi" in reader.pipettes[params["pipetteId"]][1] else 1
+        many = channels_of(reader.pipettes[params["pipetteId"]][1])
         under = over(labware["wells"], well, many)
         places = [(params["labwareId"], name) for name in under if name]
         if kind == "pickUpTip":
@@ -102,8 +102,8 @@ def channels(analysis):
 def tips_of(pipette):
     """Volumes of the tips that a pipette takes, uL: `p300_single_gen2` has definitions of its second version."""
     model, kind, *generation = pipette.split("_")
-    folder = "eight_channel" if kind == "multi" else "single_channel"
-    version = "2_0" if generation else "1_0"
+    folder = {"multi": "eight_channel", "96": "ninety_six_channel"}.get(kind, "single_channel")
+    version = "3_4" if generation == ["flex"] or kind == "96" else "2_0" if generation else "1_0"
     path = f"data/pipette/definitions/2/liquid/{folder}/{model}/default/{version}.json"
     known = importlib.resources.files("opentrons_shared_data").joinpath(path).read_text()
     return {float(tip[1:]) for tip in json.loads(known)["supportedTips"]}
@@ -122,11 +122,11 @@ def over(wells, well, many):
     """The well over which each channel is where the first one is over the middle of this well."""
     first = wells[well]
 
-    def opens(of, y):
-        right, back = abs(of["x"] - first["x"]), abs(of["y"] - y)
+    def opens(of, x, y):
+        right, back = abs(of["x"] - x), abs(of["y"] - y)
         if "diameter" in of:
             return (right * right + back * back) ** 0.5 <= of["diameter"] / 2
         return right <= of["xDimension"] / 2 and back <= of["yDimension"] / 2
 
-    rows = [first["y"] - PITCH * channel for channel in range(many)]
-    return [next((name for name, of in wells.items() if opens(of, y)), None) for y in rows]
+    places = [(first["x"] + PITCH * (channel // ROWS), first["y"] - PITCH * (channel % ROWS)) for channel in range(many)]
+    return [next((name for name, of in wells.items() if opens(of, x, y)), None) for x, y in places]

@@ -91,7 +91,7 @@ def tips(analysis):
 
 def modules(analysis):
     """What modules do, in order, but for what is so already, and what is switched off at the end."""
-    reader, deeds, is_open = Reader(), [], {}
+    reader, deeds, is_open = Reader("OT-2 Standard"), [], {}
     for command in analysis["commands"]:
         reader.take(command)
     for deed in reader.out:
