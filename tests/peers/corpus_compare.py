@@ -118,7 +118,7 @@ class Reader:
                 self.at.pop(mount, None)
             case "aspirate" | "dispense" | "blowout":
                 self.at[mount] = self.spot(params)
-                self.say(kind, mount, self.at[mount], volume, flow)
+                self.say(kind, mount, self.at[mount], volume, flow, params.get("pushOut"))
             case "aspirateInPlace" | "dispenseInPlace" | "blowOutInPlace" | "airGapInPlace":
                 verb = {"aspirateInPlace": "aspirate", "airGapInPlace": "aspirate", "dispenseInPlace": "dispense"}.get(kind, "blowout")
                 self.say(verb, mount, self.at.get(mount), volume, flow)

@@ -27,6 +27,8 @@ pub(super) enum Holds {
     Number,
     /// A number that is left out where it is 0.
     Given,
+    /// A number that is left out where it is less than 0.
+    FromZero,
     /// The mount whose axis and plunger go home.
     Mount,
     /// The mount whose plunger goes home.
@@ -136,7 +138,7 @@ const FORMS: &[Form] = &[
     form("loadLiquid", About::Well, &[("volume", Number)], &[]),
     at("pickUpTip", &[("well", Well)], &[]),
     at("aspirate", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[]),
-    at("dispense", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[]),
+    at("dispense", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[("pushOut", Holds::FromZero)]),
     at("blowout", &[("well", Well), ("flowRate", Number)], &[]),
     at("touchTip", &[("well", Well)], &[("radius", Number), ("speed", Number)]),
     at(

@@ -252,7 +252,9 @@ impl Script {
             }
             "dispense" => {
                 self.rate(command, "dispense");
-                self.line(&format!("{pipette}.dispense({}, {spot})", number("volume")));
+                let push = command.params.get("pushOut");
+                let push = push.map_or(String::new(), |volume| format!(", push_out={}", shown(Some(volume))));
+                self.line(&format!("{pipette}.dispense({}, {spot}{push})", number("volume")));
             }
             "blowout" => {
                 self.rate(command, "blow_out");

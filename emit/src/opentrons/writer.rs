@@ -206,6 +206,12 @@ impl Writer<'_, '_> {
                         params.insert(key, value.into());
                     }
                 }
+                Holds::FromZero => {
+                    let value = parsed(message, field, value)?;
+                    if value >= 0.0 {
+                        params.insert(key, value.into());
+                    }
+                }
                 Holds::Flag => drop(params.insert(key, flag(message, field, value)?.into())),
                 Holds::Well => {
                     let (labware, well) = self.well(message, value, at)?;

@@ -444,7 +444,9 @@ impl<'a> Steps<'a> {
         pass: impl FnOnce(&mut Liquids, &str, &[String]),
     ) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        let options = self.options(command, Some(flow), &[]);
+        let push: Vec<String> =
+            command.number("pushOut").map(|volume| format!("push_out: {} uL", number(volume))).into_iter().collect();
+        let options = self.options(command, Some(flow), &push);
         if let Some((bin, _)) = self.deck.bins.get(command.text("labwareId")) {
             pass(&mut self.liquids, "", &[]);
             return self.say(format!("{before}{bin}[A1] by {by}{options}"));
