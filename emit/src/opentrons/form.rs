@@ -33,6 +33,10 @@ pub(super) enum Holds {
     Mount,
     /// The mount whose plunger goes home.
     Plunger,
+    /// The one wavelength that a photometer is set up for, nm.
+    Wavelength,
+    /// The wavelength that it takes off, nm; left out where it is 0.
+    Reference,
     /// `true` or `false`.
     Flag,
     /// A place of loaded labware, or those of all channels.
@@ -182,6 +186,15 @@ const FORMS: &[Form] = &[
     form("temperatureModule/deactivate", About::Module, &[], &[]),
     form("magneticModule/engage", About::Module, &[("height", Number)], &[]),
     form("magneticModule/disengage", About::Module, &[], &[]),
+    form("absorbanceReader/openLid", About::Module, &[], &[]),
+    form("absorbanceReader/closeLid", About::Module, &[], &[]),
+    form(
+        "absorbanceReader/initialize",
+        About::Module,
+        &[("sampleWavelengths", Holds::Wavelength)],
+        &[("referenceWavelength", Holds::Reference)],
+    ),
+    form("absorbanceReader/read", About::Module, &[], &[]),
     form("heaterShaker/setTargetTemperature", About::Module, &[("celsius", Number)], &[]),
     form("heaterShaker/waitForTemperature", About::Module, &[], &[]),
     form("heaterShaker/deactivateHeater", About::Module, &[], &[]),

@@ -338,6 +338,16 @@ impl Script {
                 None => return false,
             },
             "temperatureModule/deactivate" => self.line(&format!("{module}.deactivate()")),
+            "absorbanceReader/openLid" => self.line(&format!("{module}.open_lid()")),
+            "absorbanceReader/closeLid" => self.line(&format!("{module}.close_lid()")),
+            "absorbanceReader/read" => self.line(&format!("{module}.read()")),
+            "absorbanceReader/initialize" => {
+                let wavelength = shown(command.params.get("sampleWavelengths").map(|all| &all[0]));
+                let reference = command.params.get("referenceWavelength");
+                let reference =
+                    reference.map_or(String::new(), |nm| format!(", reference_wavelength={}", shown(Some(nm))));
+                self.line(&format!("{module}.initialize(\"single\", [{wavelength}]{reference})"));
+            }
             "magneticModule/engage" => self.line(&format!("{module}.engage(height_from_base={})", number("height"))),
             "magneticModule/disengage" => self.line(&format!("{module}.disengage()")),
             "heaterShaker/waitForTemperature" => self.line(&format!("{module}.wait_for_temperature()")),

@@ -212,6 +212,16 @@ impl Writer<'_, '_> {
                         params.insert(key, value.into());
                     }
                 }
+                Holds::Wavelength => {
+                    params.insert("measureMode".to_owned(), "single".into());
+                    params.insert(key, json!([parsed(message, field, value)?.round() as i64]));
+                }
+                Holds::Reference => {
+                    let nanometres = parsed(message, field, value)?.round() as i64;
+                    if nanometres > 0 {
+                        params.insert(key, nanometres.into());
+                    }
+                }
                 Holds::Flag => drop(params.insert(key, flag(message, field, value)?.into())),
                 Holds::Well => {
                     let (labware, well) = self.well(message, value, at)?;

@@ -390,6 +390,7 @@ fn module_word(model: &str) -> &'static str {
         m if m.starts_with("magnetic") => "magnet",
         m if m.starts_with("thermocycler") => "cycler",
         m if m.starts_with("heaterShaker") => "shaker",
+        m if m.starts_with("absorbance") => "reader",
         _ => "module",
     }
 }

@@ -630,6 +630,17 @@ impl<'a> Steps<'a> {
             "setTargetLidTemperature" => self.say(format!("heat lid {name} to {celsius} degC")),
             "waitForLidTemperature" => self.say(format!("settle lid {name}")),
             "deactivateLid" => self.say(format!("stop heating lid {name}")),
+            "initialize" => {
+                let wavelengths = command.params["sampleWavelengths"].as_array();
+                let [wavelength] = wavelengths.map_or(&[][..], Vec::as_slice) else {
+                    return Err("the language sets a reader up for one wavelength".to_owned());
+                };
+                let reference = command.number("referenceWavelength").map(|nm| format!("reference: {} nm", number(nm)));
+                let options = words::braced(&reference.into_iter().collect::<Vec<_>>());
+                let wavelength = wavelength.as_f64().ok_or("it gives no wavelength")?;
+                self.say(format!("initialize {name} at {} nm{options}", number(wavelength)))
+            }
+            "read" => self.say(format!("read plate {name}")),
             "openLid" => self.say(format!("open lid {name}")),
             "closeLid" => self.say(format!("close lid {name}")),
             "setAndWaitForShakeSpeed" => {
