@@ -27,6 +27,7 @@ mod explain;
 mod faults;
 mod files;
 mod findings;
+mod flex;
 mod follows;
 mod formatting;
 mod gases;

@@ -400,17 +400,17 @@ workflow go in deck {{
 }
 
 #[test]
-fn what_is_no_protocol_of_an_ot2_is_refused() {
+fn what_is_no_protocol_of_a_known_robot_is_refused() {
     let dir = folder("refused");
-    let mut flex = analysis(Vec::new());
-    flex["robotType"] = "OT-3 Standard".into();
+    let mut other = analysis(Vec::new());
+    other["robotType"] = "OT-9".into();
     let mut wrong = analysis(Vec::new());
     wrong["errors"] = json!([{ "detail": "KeyError: 'x'" }]);
     let legacy = analysis(vec![command("custom", json!({ "legacyCommandText": "Touching tip" }))]);
     let cases = [
         ("{".to_owned(), "neither an analysis nor a JSON protocol"),
         ("[]".to_owned(), "neither an analysis nor a JSON protocol"),
-        (flex.to_string(), "only protocols of the OT-2"),
+        (other.to_string(), "only protocols of the OT-2 and of the Flex"),
         (wrong.to_string(), "fails in its analysis: KeyError"),
         (legacy.to_string(), "lacks heights"),
     ];

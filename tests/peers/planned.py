@@ -8,6 +8,11 @@ def wells_of(argument):
     return argument if isinstance(argument, list) else [argument]
 
 
+def place(wells, channel, count):
+    """Where a channel works: as many neighbours share each place."""
+    return wells[channel * len(wells) // count]
+
+
 def planned(lines):
     """Net volume of each well, uL, and how often a tip was taken."""
     net, tips, channels = collections.Counter(), 0, {}
@@ -24,19 +29,20 @@ def planned(lines):
             amount = volume["value"] * (1000 if volume["unit"] == "mL" else 1)
             count = channels.setdefault(device, eight(lines, device))
             for channel in range(count):
-                net[wells[channel % len(wells)]] -= amount
+                net[place(wells, channel, count)] -= amount
                 held[device][channel] += amount
         if verb == "dispense":
             volume, wells = arguments["volume"], wells_of(arguments["target"])
             amount = volume["value"] * (1000 if volume["unit"] == "mL" else 1)
-            for channel in range(channels[device]):
+            count = channels[device]
+            for channel in range(count):
                 given = min(amount, held[device][channel]) if held[device][channel] - amount < 1e-6 else amount
-                net[wells[channel % len(wells)]] += given
+                net[place(wells, channel, count)] += given
                 held[device][channel] -= given
         if verb == "blow out":
             wells = wells_of(arguments["target"])
             for channel in range(channels[device]):
-                net[wells[channel % len(wells)]] += held[device].pop(channel, 0)
+                net[place(wells, channel, channels[device])] += held[device].pop(channel, 0)
         if verb in ("drop tip", "return tip"):
             held[device].clear()
     return net, tips

@@ -19,6 +19,7 @@ import tempfile
 
 import jsonschema
 
+from corpus_compare import channels_of
 from planned import planned
 
 TOLERANCE = 1e-9
@@ -52,9 +53,9 @@ def moved(analysis):
         kind, params, result = command["commandType"], command["params"], command.get("result") or {}
         if kind == "loadLabware":
             definition = result["definition"]
-            labware[result["labwareId"]] = (params["displayName"], definition["ordering"])
+            labware[result["labwareId"]] = (params.get("displayName"), definition["ordering"])
         if kind == "loadPipette":
-            pipettes[result["pipetteId"]] = 8 if "multi" in params["pipetteName"] else 1
+            pipettes[result["pipetteId"]] = channels_of(params["pipetteName"])
         if kind == "pickUpTip":
             tips += 1
         if kind not in ("aspirate", "dispense", "blowout"):
@@ -68,7 +69,12 @@ def moved(analysis):
         volume = result.get("volume", 0) if kind != "blowout" else held[pipette]
         sign = -1 if kind == "aspirate" else 1
         held[pipette] -= sign * volume
-        reached = [params["wellName"]] * count if len(column) == 1 else column[column.index(params["wellName"]):][:count]
+        if count == 96:
+            # All columns of a plate, eight channels to each of twelve troughs, or all to one.
+            wells = [well for column in ordering for well in column]
+            reached = [well for well in wells for _ in range(96 // len(wells))]
+        else:
+            reached = [params["wellName"]] * count if len(column) == 1 else column[column.index(params["wellName"]):][:count]
         for well in reached:
             net[f"{name}[{well}]"] += sign * volume
     return net, tips
