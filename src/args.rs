@@ -615,7 +615,7 @@ pub struct EmitArgs {
 pub enum Foreign {
     /// A database of PHREEQC, as `phreeqc.dat` or `wateq4f.dat`: equilibria in water, with activity coefficients.
     Phreeqc,
-    /// The analysis of a protocol for the OT-2 (`opentrons analyze --json-output`), or a JSON protocol: a lab, and a workflow with loops.
+    /// The analysis of a protocol for the OT-2 or the Flex (`opentrons analyze --json-output`), or a JSON protocol: a lab, and a workflow with loops.
     Opentrons,
 }
 

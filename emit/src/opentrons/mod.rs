@@ -29,10 +29,13 @@ pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let (protocol, warnings) = protocol(subject, performance)?;
     let bins = protocol.bins();
     let beyond = |c: &&protocol::Command| {
-        ["setTipState", "absorbanceReader/initialize"].contains(&c.name) || c.text("labwareId") == deck::BIN || bins.contains(c.text("labwareId"))
+        ["setTipState", "absorbanceReader/initialize"].contains(&c.name)
+            || c.text("labwareId") == deck::BIN
+            || bins.contains(c.text("labwareId"))
     };
     if let Some(command) = protocol.commands.iter().find(beyond) {
-        let headline = format!("{WHAT} in JSON cannot refill a rack, dispense into a bin or set up an absorbance reader");
+        let headline =
+            format!("{WHAT} in JSON cannot refill a rack, dispense into a bin or set up an absorbance reader");
         let d = not_expressible(command.at, headline, "this step sends it").help("use `--target opentrons-python`");
         return Err(vec![d]);
     }

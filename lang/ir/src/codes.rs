@@ -157,6 +157,7 @@ codes! {
     NEVER_FILLED "never-filled" "V2" "liquid is taken from an empty vessel";
     OUT_OF_TIPS "out-of-tips" "V4" "a rack has no fresh tip left";
     NO_RACK "no-rack" "T1" "a transfer needs tips, but names no rack";
+    NO_RULE "no-rule" "T1" "a liquid class has no rule for a pipette with its tips";
     NO_MIX_VOLUME "no-mix-volume" "V3" "a transfer mixes, but gives no volume";
     LEFT_IN_TIP "left-in-tip" "T2" "liquid stays in a tip until it drips or dries";
     OVERLOAD "overload" "V3" "the load of a balance is above its range";
