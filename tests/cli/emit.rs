@@ -158,8 +158,8 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
         ),
         (
             "bin",
-            format!("{tip}\ndrop tip into ot2.trash by ot2.left"),
-            &["no command for `drop tip`", "`PipetteCommands`"],
+            format!("{tip}\ndrop tip into other.trash by ot2.left"),
+            &["`other.trash` is no bin on the deck of `ot2`"],
         ),
         (
             "elsewhere",

@@ -178,22 +178,115 @@ fn ninety_six_channels_take_a_rack_and_fill_a_plate() {
 }
 
 #[test]
-fn layouts_of_some_nozzles_are_listed_and_what_follows_is_left_out() {
-    let dir = folder("flex_layout");
-    let steps = vec![
-        load("tips", "opentrons_flex_96_tiprack_200ul", slot("C2"), (8, 12), [97.0, 200.0]),
-        command("configureNozzleLayout", json!({ "pipetteId": "p", "configurationParams": { "style": "ALL" } })),
+fn layouts_of_some_nozzles_come_back() {
+    let layout = |style: &str, corner: &str| {
         command(
             "configureNozzleLayout",
-            json!({ "pipetteId": "p", "configurationParams": { "style": "SINGLE", "primaryNozzle": "H1" } }),
-        ),
+            json!({ "pipetteId": "p", "configurationParams": { "style": style, "primaryNozzle": corner } }),
+        )
+    };
+    let mut part = layout("QUADRANT", "H1");
+    part["params"]["configurationParams"]["frontRightNozzle"] = "H1".into();
+    part["params"]["configurationParams"]["backLeftNozzle"] = "F1".into();
+    let away = |steps: &mut Vec<Value>| {
+        steps.push(command(
+            "moveToAddressableAreaForDropTip",
+            json!({ "pipetteId": "p", "addressableAreaName": "movableTrashA3" }),
+        ));
+        steps.push(command("dropTipInPlace", json!({ "pipetteId": "p" })));
+    };
+    let mut steps = vec![
+        load("tips", "opentrons_flex_96_tiprack_200ul", slot("C2"), (8, 12), [97.0, 200.0]),
+        load("plate", "nest_96_wellplate_200ul_flat", slot("B3"), (8, 12), [10.8, 200.0]),
+        command("configureNozzleLayout", json!({ "pipetteId": "p", "configurationParams": { "style": "ALL" } })),
+        layout("SINGLE", "H1"),
+        well("pickUpTip", "tips", "A1", json!({})),
+        well("aspirate", "plate", "C4", json!({ "volume": 20.0, "flowRate": 716.0 })),
+        well("dispense", "plate", "D4", json!({ "volume": 20.0, "flowRate": 716.0 })),
+    ];
+    away(&mut steps);
+    // The place named is that of the front one of three.
+    steps.extend([
+        part,
+        well("pickUpTip", "tips", "D1", json!({})),
+        well("aspirate", "plate", "C5", json!({ "volume": 20.0, "flowRate": 716.0 })),
+        well("dispense", "plate", "H5", json!({ "volume": 20.0, "flowRate": 716.0 })),
+    ]);
+    away(&mut steps);
+    steps
+        .push(command("configureNozzleLayout", json!({ "pipetteId": "p", "configurationParams": { "style": "ALL" } })));
+    steps.push(well("pickUpTip", "tips", "A2", json!({})));
+    away(&mut steps);
+    let (text, python) = there_and_back("flex_layouts", analysis("p1000_multi_flex", steps));
+    for line in [
+        "lay out flex.left from H1\n    pick up tip tips[A1] by flex.left\n    aspirate 20 uL from plate[C4] by flex.left",
+        "pick up tip [tips[B1], tips[C1], tips[D1]] by flex.left\n    aspirate 20 uL from [plate[A5], plate[B5], plate[C5]] by flex.left",
+        "dispense 20 uL into [plate[F5], plate[G5], plate[H5]] by flex.left",
+        "lay out flex.left from all\n    pick up tip tips.column(2) by flex.left",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    for line in [
+        "configure_nozzle_layout(style=SINGLE, start=\"H1\")",
+        "configure_nozzle_layout(style=PARTIAL_COLUMN, start=\"H1\", end=\"F1\")",
+        "pick_up_tip(tips[\"D1\"])",
+        "aspirate(20, plate[\"C5\"].bottom(2))",
+        "configure_nozzle_layout(style=ALL)",
+    ] {
+        assert!(python.contains(line), "{line}\n{python}");
+    }
+}
+
+#[test]
+fn a_layout_that_the_language_does_not_have_is_listed_and_what_follows_is_left_out() {
+    let dir = folder("flex_layout");
+    let quadrant =
+        json!({ "style": "QUADRANT", "primaryNozzle": "A1", "backLeftNozzle": "A1", "frontRightNozzle": "D6" });
+    let steps = vec![
+        load("tips", "opentrons_flex_96_tiprack_200ul", slot("C2"), (8, 12), [97.0, 200.0]),
+        command("configureNozzleLayout", json!({ "pipetteId": "p", "configurationParams": quadrant })),
         well("pickUpTip", "tips", "A1", json!({})),
     ];
-    write(&dir, "a.json", analysis("p1000_multi_flex", steps));
+    write(&dir, "a.json", analysis("p1000_96", steps));
     let imported = matterixc_in(&dir, &["import", "opentrons", "a.json", "--out", "a.mtx"]);
     let said = flat(&imported.err);
-    assert!(said.contains("configureNozzleLayout (command 4)") && said.contains("pickUpTip (command 5)"), "{said}");
-    assert!(!said.contains("command 3"), "{said}");
+    assert!(said.contains("configureNozzleLayout (command 3)") && said.contains("pickUpTip (command 4)"), "{said}");
+}
+
+#[test]
+fn rows_and_columns_of_a_head_work_where_their_tips_are() {
+    let things = "tips = FlexTips200 on flex.slot[C2]\nmore = FlexTips200 on flex.slot[D1]\nplate = Corning96 on flex.slot[D3] holding { A1 .. H12: 100 uL of water }\n\
+                  bath = Reservoir12 on flex.slot[B2] holding { A1 .. A12: 10 mL of water }";
+    let text = |steps: &str| lab("FlexP1000x96, FlexTips200", "left: FlexP1000x96, ", things, steps);
+    let good = text(
+        "lay out flex.left from A12\npick up tip tips.column(1) by flex.left\naspirate 20 uL from plate.column(3) by flex.left\n\
+         dispense 20 uL into bath[A5] by flex.left\ndrop tip by flex.left\nlay out flex.left from H1\npick up tip more.row(1) by flex.left\n\
+         aspirate 20 uL from plate.row(2) by flex.left\ndispense 20 uL into bath.wells by flex.left\ndrop tip by flex.left\n\
+         expect bath[A5].contents.volume in 10.1799 mL .. 10.1801 mL\nexpect bath[A12].contents.volume in 10.0199 mL .. 10.0201 mL\n\
+         expect plate[B3].contents.volume in 59.99 uL .. 60.01 uL",
+    );
+    assert_eq!(checked("flex_rows", &good), (0, "no findings".to_owned()));
+    let cases = [
+        // The other channels would take tips, too.
+        ("way", "lay out flex.left from A1\npick up tip tips.column(1) by flex.left\ndrop tip by flex.left"),
+        ("order", "lay out flex.left from A12\npick up tip from tips by flex.left\ndrop tip by flex.left"),
+        (
+            "column",
+            "lay out flex.left from H1\npick up tip more.row(1) by flex.left\naspirate 20 uL from plate.column(1) by flex.left\ndrop tip by flex.left",
+        ),
+        (
+            "row",
+            "lay out flex.left from A12\npick up tip tips.column(1) by flex.left\naspirate 20 uL from plate[A1 .. A8] by flex.left\ndrop tip by flex.left",
+        ),
+        (
+            "narrow",
+            "lay out flex.left from A12\npick up tip tips.column(1) by flex.left\naspirate 20 uL from plate[A1] by flex.left\ndrop tip by flex.left",
+        ),
+    ];
+    for (name, steps) in cases {
+        let (code, said) = checked(&format!("flex_rows_{name}"), &text(steps));
+        assert!(code == 1 && said.contains("wrong-column"), "{name}: {said}");
+    }
 }
 
 /// A lab with a Flex, by what its pipette and its things are.

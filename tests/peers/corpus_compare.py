@@ -22,6 +22,8 @@ import math
 #: Commands that only say what is there.
 SETUP = {"loadLabware", "loadPipette", "loadModule", "loadLiquid", "loadLiquidClass"}
 BIN = "bin"
+#: The layout in which all nozzles take tips.
+ALL = (("style", "ALL"),)
 
 
 class Reader:
@@ -35,6 +37,7 @@ class Reader:
         self.holds = {}  # by module: for how long it holds that, once it is there
         self.lids = {}
         self.robot = robot
+        self.layouts = {}  # by mount: which nozzles take tips
         self.out = []
 
     def say(self, verb, *what):
@@ -106,7 +109,8 @@ class Reader:
                     self.say("drop tip", mount, spot)
                 else:
                     # A tip is picked up and given back in one way only.
-                    self.say("pick up tip" if kind == "pickUpTip" else "return tip", mount, *spot[:2])
+                    layout = self.layouts.get(mount, ALL) if kind == "pickUpTip" else ALL
+                    self.say("pick up tip" if kind == "pickUpTip" else "return tip", mount, *spot[:2], layout)
                 self.at.pop(mount, None)
             case "moveToAddressableAreaForDropTip" | "moveToAddressableArea":
                 self.aimed[mount] = params["addressableAreaName"]
@@ -149,9 +153,9 @@ class Reader:
                 self.at.clear()
             case "setRailLights":
                 self.say("lights", params["on"])
-            case "configureNozzleLayout" if params["configurationParams"]["style"] == "ALL":
-                # All nozzles take tips, as without it.
-                pass
+            case "configureNozzleLayout":
+                # Said where tips are taken.
+                self.layouts[mount] = frozen(params["configurationParams"])
             case "prepareToAspirate":
                 # The plunger goes to its start; what the tip does next says so.
                 pass

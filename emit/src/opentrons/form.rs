@@ -49,6 +49,8 @@ pub(super) enum Holds {
     Coordinate,
     /// What a thing stands on: a place of the deck, or a module.
     Location,
+    /// The corner of the head at which the channels begin that take tips: `H1`, or `all`.
+    Corner,
     /// Labware by its name in the lab.
     Labware,
     /// How far from where the gripper usually grips or lets go, along an axis, mm: `pickUpOffset/x`.
@@ -86,6 +88,9 @@ impl Form {
 /// The messages that load a bin or a chute, for which JSON has no command.
 pub(super) const TRASH_BIN: &str = "loadTrashBin";
 pub(super) const WASTE_CHUTE: &str = "loadWasteChute";
+
+/// The message that says from which corner of a head tips are taken.
+pub(super) const LAY_OUT: &str = "layOut";
 
 /// The parameter of these that holds what the bin is called.
 pub(super) const BIN_ID: &str = "binId";
@@ -140,6 +145,8 @@ const FORMS: &[Form] = &[
     form(WASTE_CHUTE, About::Bin, &[("location", Location)], &[]),
     form("loadModule", About::Module, &[("model", Text), ("location", Location)], &[]),
     form("loadLiquid", About::Well, &[("volume", Number)], &[]),
+    // The layout of nozzles is said when it is known how many tips are taken.
+    form(LAY_OUT, About::Pipette, &[("corner", Holds::Corner)], &[]),
     at("pickUpTip", &[("well", Well)], &[]),
     at("aspirate", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[]),
     at("dispense", &[("well", Well), ("volume", Number), ("flowRate", Number)], &[("pushOut", Holds::FromZero)]),

@@ -3,6 +3,7 @@
 mod deck;
 mod form;
 mod json;
+mod layout;
 mod liquids;
 mod message;
 mod protocol;

@@ -75,6 +75,8 @@ impl<'p> Protocol<'p> {
             moved: moved(subject, performance, &origins),
             later: BTreeMap::new(),
             off: BTreeSet::new(),
+            layouts: BTreeMap::new(),
+            corners: BTreeMap::new(),
             origins,
             protocol: Protocol {
                 subject,

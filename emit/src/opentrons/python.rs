@@ -72,6 +72,9 @@ const CALLED: [(&str, &str); 6] = [
     ("p1000_96", "flex_96channel_1000"),
 ];
 
+/// The first API level with layouts of one nozzle.
+const LAYOUTS: &str = "2.20";
+
 /// A set point, the wait that follows, and the call that is both.
 const TEMPERED: [(&str, &str, &str); 3] = [
     ("temperatureModule/setTargetTemperature", "temperatureModule/waitForTemperature", "set_temperature"),
@@ -142,12 +145,16 @@ impl Script {
         if protocol.loads.iter().chain(&protocol.commands).any(is_off) {
             self.text.push_str("from opentrons import protocol_api\n\n");
         }
+        let lays_out = protocol.commands.iter().any(|c| c.name == "configureNozzleLayout");
+        if lays_out {
+            self.text.push_str("from opentrons.protocol_api import ALL, COLUMN, PARTIAL_COLUMN, ROW, SINGLE\n\n");
+        }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
         let _ = writeln!(
             self.text,
             "requirements = {{\"robotType\": {}, \"apiLevel\": {}}}\n",
             setting("type"),
-            setting("api")
+            if lays_out && setting("api") == "\"2.19\"" { quoted(LAYOUTS) } else { setting("api") }
         );
         if !protocol.definitions.is_empty() {
             self.text.push_str("# Labware that does not come with Opentrons' software.\nDEFINITIONS = {\n");
@@ -246,6 +253,16 @@ impl Script {
         }
         match command.name {
             "pickUpTip" => self.line(&format!("{pipette}.pick_up_tip({spot})")),
+            "configureNozzleLayout" => {
+                let Some(layout) = command.params.get("configurationParams") else { return false };
+                let corner = |key: &str, name: &str| {
+                    layout[key].as_str().map_or(String::new(), |nozzle| format!(", {name}={}", quoted(nozzle)))
+                };
+                let style = layout["style"].as_str().unwrap_or_default();
+                let style = if style == "QUADRANT" { "PARTIAL_COLUMN" } else { style };
+                let (start, end) = (corner("primaryNozzle", "start"), corner("backLeftNozzle", "end"));
+                self.line(&format!("{pipette}.configure_nozzle_layout(style={style}{start}{end})"));
+            }
             "aspirate" => {
                 self.rate(command, "aspirate");
                 self.line(&format!("{pipette}.aspirate({}, {spot})", number("volume")));

@@ -10,7 +10,8 @@ use serde_json::{Map, Value, json};
 
 use super::WHAT;
 use super::deck::{Deck, GRIPPER_CHUTE, Location, Waste};
-use super::form::{About, BIN_ID, BY_GRIPPER, Holds, TRASH_BIN};
+use super::form::{About, BIN_ID, BY_GRIPPER, Holds, LAY_OUT, TRASH_BIN};
+use super::layout::Layout;
 use super::message::{Message, names};
 use super::protocol::{Command, Protocol, belongs};
 use crate::finding::not_expressible;
@@ -31,6 +32,10 @@ pub(super) struct Writer<'p, 'f> {
     pub(super) moved: BTreeMap<InstanceId, bool>,
     /// Labware that stands off the deck now.
     pub(super) off: BTreeSet<InstanceId>,
+    /// Which nozzles of pipettes take tips.
+    pub(super) layouts: BTreeMap<InstanceId, Layout>,
+    /// From which corner of a head tips are taken next.
+    pub(super) corners: BTreeMap<InstanceId, String>,
     /// What loads labware that comes to the deck on the way, without a question.
     pub(super) later: BTreeMap<InstanceId, Said>,
     pub(super) found: &'f mut Vec<Diagnostic>,
@@ -161,11 +166,43 @@ impl Writer<'_, '_> {
             return self.found.push(not_expressible(at, headline, format!("this step does `{}`", step.label)));
         }
         for said in said {
-            match Message::read(said).and_then(|message| self.command(device, &message, at)) {
+            let message = match Message::read(said) {
+                Ok(message) => message,
+                Err(d) => {
+                    self.found.push(d);
+                    continue;
+                }
+            };
+            if message.form.name == LAY_OUT {
+                self.corners.insert(device, message.get("corner").unwrap_or("all").to_owned());
+                continue;
+            }
+            match self.lay_out(device, &message, at).and_then(|()| self.command(device, &message, at)) {
                 Ok(command) => self.protocol.commands.push(command),
                 Err(d) => self.found.push(d),
             }
         }
+    }
+
+    /// Says which nozzles take tips, where that is not as it was.
+    fn lay_out(&mut self, device: InstanceId, message: &Message<'_>, at: Span) -> Result<(), Diagnostic> {
+        if message.form.name != "pickUpTip" {
+            return Ok(());
+        }
+        let places = names(message.get("well").unwrap_or_default());
+        let labels: Vec<&str> = places.iter().map(|place| super::deck::label(place)).collect();
+        let Some(layout) = Layout::of(self.corners.get(&device).map_or("all", String::as_str), &labels) else {
+            let headline = format!("{WHAT} has no layout of nozzles for these {} tips", labels.len());
+            let help = "take one tip, a row, a column, or fewer than eight from `H1`";
+            return Err(not_expressible(at, headline, "this step takes them").help(help));
+        };
+        if self.layouts.get(&device).unwrap_or(&Layout::All) != &layout {
+            let own = self.deck.get(device).map(|l| l.id.clone()).unwrap_or_default();
+            let params = json!({ "pipetteId": own, "configurationParams": layout.params() });
+            self.push("configureNozzleLayout", params, at);
+        }
+        self.layouts.insert(device, layout);
+        Ok(())
     }
 
     /// A message as a command.
@@ -224,7 +261,7 @@ impl Writer<'_, '_> {
                 }
                 Holds::Flag => drop(params.insert(key, flag(message, field, value)?.into())),
                 Holds::Well => {
-                    let (labware, well) = self.well(message, value, at)?;
+                    let (labware, well) = self.well(device, message, value, at)?;
                     params.insert("labwareId".to_owned(), labware.into());
                     params.insert("wellName".to_owned(), well.into());
                 }
@@ -287,7 +324,7 @@ impl Writer<'_, '_> {
                     }
                     params.insert("addressableAreaName".to_owned(), area.into());
                 }
-                Holds::Channels => {}
+                Holds::Channels | Holds::Corner => {}
                 Holds::Definition => self.definition(value, device, &mut params)?,
             }
         }
@@ -300,8 +337,14 @@ impl Writer<'_, '_> {
         Ok(Command { name, params, at })
     }
 
-    /// The place a command is about: where its first channel goes.
-    fn well(&self, message: &Message<'_>, value: &str, at: Span) -> Result<(String, String), Diagnostic> {
+    /// The place a command is about: where its first channel goes, or the last one that takes tips.
+    fn well(
+        &self,
+        device: InstanceId,
+        message: &Message<'_>,
+        value: &str,
+        at: Span,
+    ) -> Result<(String, String), Diagnostic> {
         let scene = &self.protocol.subject.program.scene;
         let all = names(value);
         let mut places = Vec::new();
@@ -315,7 +358,9 @@ impl Writer<'_, '_> {
             };
             places.push(place);
         }
-        let Some(first) = places.first().cloned() else { return Err(message.wrong("it names no place".to_owned())) };
+        let names_front = self.layouts.get(&device).is_some_and(Layout::names_front);
+        let first = if names_front { places.last() } else { places.first() };
+        let Some(first) = first.cloned() else { return Err(message.wrong("it names no place".to_owned())) };
         if places.iter().any(|(labware, _)| *labware != first.0) {
             return Err(not_expressible(at, format!("{WHAT} goes to one labware at a time"), "several labware"));
         }

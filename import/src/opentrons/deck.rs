@@ -93,6 +93,15 @@ impl Labware {
         self.order.iter().filter(in_line).map(String::as_str).collect()
     }
 
+    /// The wells of a row, counted from 1, from left to right.
+    fn across(&self, row: u32) -> Vec<&str> {
+        let mut wells: Vec<(u32, &str)> = Vec::new();
+        wells
+            .extend(self.order.iter().filter_map(|w| cell(w).filter(|(r, _)| *r == row).map(|(_, c)| (c, w.as_str()))));
+        wells.sort_unstable();
+        wells.into_iter().map(|(_, well)| well).collect()
+    }
+
     /// How many columns it has.
     fn columns(&self) -> usize {
         self.order.iter().filter_map(|well| cell(well)).map(|(_, column)| column as usize).max().unwrap_or(0)
@@ -109,10 +118,24 @@ impl Labware {
         let at = |channel: usize| {
             let (column, row) = (channel / ROWS, channel % ROWS);
             let (x, y) = (x + PITCH * column as f64, y - PITCH * row as f64);
-            self.order.iter().find(|other| self.wells.get(*other).is_some_and(|o| o.opens_at(x, y))).map(String::as_str)
+            self.over(x, y)
         };
         (0..channels).map(at).collect()
     }
+
+    /// The well whose opening is at a place, mm.
+    fn over(&self, x: f64, y: f64) -> Option<&str> {
+        self.order.iter().find(|other| self.wells.get(*other).is_some_and(|o| o.opens_at(x, y))).map(String::as_str)
+    }
+}
+
+/// Channels of a head that take tips where not all do: so many rows and columns of them, from a corner of the head.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    /// The nozzle that commands name places of: that in the corner.
+    pub(super) corner: String,
+    pub(super) rows: usize,
+    pub(super) columns: usize,
 }
 
 /// A pipette on its mount.
@@ -281,6 +304,36 @@ impl Deck {
         }
     }
 
+    /// What the channels of a layout reach where that in the corner is over a well, or why it is nothing that can be said.
+    pub(super) fn reached_by(&self, layout: &Layout, labware: &Labware, well: &str) -> Result<Place, String> {
+        let of = labware.name.clone();
+        let Some(named) = labware.wells.get(well) else { return Err(format!("`{of}` has no well {well}")) };
+        let count = layout.rows * layout.columns;
+        if count == 1 || labware.is_centred && (layout.columns == 1 || labware.columns() == 1) {
+            return Ok(Place { of, at: At::Well(well.to_owned()) });
+        }
+        let behind = |many: usize, is_last: bool| if is_last { PITCH * (many - 1) as f64 } else { 0.0 };
+        let x = named.x - behind(layout.columns, layout.corner.ends_with("12"));
+        let y = named.y + behind(layout.rows, layout.corner.starts_with('H'));
+        let cells = (0..layout.columns).flat_map(|column| (0..layout.rows).map(move |row| (column, row)));
+        let reached = cells.map(|(column, row)| labware.over(x + PITCH * column as f64, y - PITCH * row as f64));
+        let Some(reached) = reached.collect::<Option<Vec<&str>>>() else {
+            return Err("some of its channels reach no well".to_owned());
+        };
+        if reached.windows(2).any(|two| two[0] == two[1]) {
+            return Err("several of its channels reach one well, and not in its middle".to_owned());
+        }
+        let at = match cell(reached[0]) {
+            Some((1, number)) if reached == labware.column(reached[0]) => {
+                At::Column(number as usize, labware.columns())
+            }
+            Some((row, 1)) if reached == labware.across(row) => At::Row(row as usize),
+            _ if reached == labware.order => At::All(labware.kind == Kind::Tips),
+            _ => At::Wells(reached.into_iter().map(str::to_owned).collect()),
+        };
+        Ok(Place { of, at })
+    }
+
     /// The same of several rows of channels: all wells over which any is.
     fn reached_by_rows(&self, channels: usize, labware: &Labware, well: &str) -> Result<Place, String> {
         let of = labware.name.clone();
@@ -332,6 +385,10 @@ impl Deck {
         match &place.at {
             At::Well(well) => vec![well.clone()],
             At::Wells(wells) => wells.clone(),
+            At::Row(number) => {
+                let labware = self.named(&place.of);
+                labware.map_or(Vec::new(), |l| l.across(*number as u32).into_iter().map(str::to_owned).collect())
+            }
             At::All(_) => self.named(&place.of).map_or(Vec::new(), |labware| labware.order.clone()),
             At::Column(number, _) => {
                 let order = self.named(&place.of).map_or(&[][..], |labware| &labware.order);

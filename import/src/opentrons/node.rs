@@ -33,6 +33,8 @@ pub(super) enum At {
     Column(usize, usize),
     /// `[A1, C1, E1]`: what several channels reach that is no column.
     Wells(Vec<String>),
+    /// `row(1)`: what a row of channels reaches.
+    Row(usize),
     /// All of them, and whether those are tips.
     All(bool),
 }
@@ -49,6 +51,7 @@ impl std::fmt::Display for Place {
         match &self.at {
             At::Well(well) => write!(f, "{of}[{well}]"),
             At::Column(number, _) => write!(f, "{of}.column({number})"),
+            At::Row(number) => write!(f, "{of}.row({number})"),
             At::All(true) => write!(f, "{of}.tips"),
             At::All(false) => write!(f, "{of}.wells"),
             At::Wells(wells) => {

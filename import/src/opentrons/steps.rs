@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use super::analysis::{Analysis, Command};
-use super::deck::{Deck, Kind, Mounted};
+use super::deck::{Deck, Kind, Labware, Layout, Mounted};
 use super::liquids::{Holding, Liquids};
-use super::node::{Node, Place};
+use super::node::{Node, Place, cell};
 use super::tips::Refills;
 use super::words::{self, number};
 use crate::LeftOut;
@@ -46,8 +46,8 @@ pub(super) struct Steps<'a> {
     tips: BTreeMap<String, usize>,
     /// What its tips take, uL.
     sizes: BTreeMap<String, f64>,
-    /// Pipettes with a layout of nozzles that is not imported.
-    parted: BTreeSet<String>,
+    /// Which nozzles of a pipette take tips, where not all do; nothing where that is not imported.
+    layouts: BTreeMap<String, Option<Layout>>,
     /// By pipette: the bin that it was brought over.
     aimed: BTreeMap<String, String>,
     /// What modules were set to last, degC.
@@ -100,7 +100,7 @@ impl<'a> Steps<'a> {
             refills: Refills::new(),
             tips: BTreeMap::new(),
             sizes: BTreeMap::new(),
-            parted: BTreeSet::new(),
+            layouts: BTreeMap::new(),
             aimed: BTreeMap::new(),
             targets: BTreeMap::new(),
             staying: staying(&analysis.commands),
@@ -224,7 +224,7 @@ impl<'a> Steps<'a> {
     fn spot(&self, command: &Command) -> Result<Spot, String> {
         let labware = self.deck.labware.get(command.text("labwareId")).ok_or("its labware is not imported")?;
         let well = command.text("wellName");
-        let place = self.deck.reached(self.channels(command)?, labware, well)?;
+        let place = self.reached(command, labware, well)?;
         let depth = labware.wells.get(well).map_or(0.0, |well| well.depth);
         let location = &command.params["wellLocation"];
         let z = location["offset"]["z"].as_f64().unwrap_or(0.0);
@@ -248,16 +248,41 @@ impl<'a> Steps<'a> {
 
     /// All nozzles take tips, or some.
     fn lay_out(&mut self, command: &Command) -> Result<(), String> {
-        let id = command.text("pipetteId");
-        match command.params["configurationParams"]["style"].as_str() {
-            Some("ALL") => {
-                self.parted.remove(id);
-                Ok(())
+        let (mounted, by) = self.pipette(command)?;
+        let id = command.text("pipetteId").to_owned();
+        let params = &command.params["configurationParams"];
+        let nozzle = |key: &str| params[key].as_str().unwrap_or_default();
+        let corner = nozzle("primaryNozzle").to_owned();
+        let layout = |rows, columns| Some(Layout { corner: corner.clone(), rows, columns });
+        let is_corner = ["A1", "H1", "A12", "H12"].contains(&corner.as_str());
+        let layout = match (params["style"].as_str().unwrap_or_default(), cell(nozzle("backLeftNozzle"))) {
+            ("ALL", _) => {
+                if self.layouts.remove(&id).is_some() {
+                    self.say(format!("lay out {by} from all"))?;
+                }
+                return Ok(());
             }
-            _ => {
-                self.parted.insert(id.to_owned());
-                Err("the language has no layouts of some nozzles".to_owned())
+            ("SINGLE", _) if is_corner => layout(1, 1),
+            ("COLUMN", _) if is_corner => layout(mounted.pipette.channels.min(8), 1),
+            ("ROW", _) if is_corner => layout(1, 12),
+            // Some of a column, from the front.
+            ("QUADRANT", Some((back, 1))) if corner == "H1" && nozzle("frontRightNozzle") == "H1" => {
+                layout(9 - back as usize, 1)
             }
+            _ => None,
+        };
+        let was = self.layouts.insert(id, layout.clone());
+        let Some(layout) = layout else { return Err("the language has no such layout of nozzles".to_owned()) };
+        let is_there = was.flatten().is_some_and(|was| was.corner == layout.corner);
+        if is_there { Ok(()) } else { self.say(format!("lay out {by} from {}", layout.corner)) }
+    }
+
+    /// What a command reaches from a well.
+    fn reached(&self, command: &Command, labware: &Labware, well: &str) -> Result<Place, String> {
+        match self.layouts.get(command.text("pipetteId")) {
+            Some(Some(layout)) => self.deck.reached_by(layout, labware, well),
+            Some(None) => Err("some of its nozzles take tips, and that is not imported".to_owned()),
+            None => self.deck.reached(self.channels(command)?, labware, well),
         }
     }
 
@@ -291,12 +316,25 @@ impl<'a> Steps<'a> {
     fn pick_up(&mut self, command: &Command) -> Result<(), String> {
         let (mounted, by) = self.pipette(command)?;
         let (id, rack, well) = (command.text("pipetteId"), command.text("labwareId"), command.text("wellName"));
-        if self.parted.contains(id) {
-            return Err("some of its nozzles take tips, and that is not imported".to_owned());
-        }
         let labware = self.deck.labware.get(rack).ok_or("its rack is not imported")?;
         if labware.kind != Kind::Tips {
             return Err(format!("`{}` is not a tip rack", labware.name));
+        }
+        if let Some(layout) = self.layouts.get(id) {
+            let Some(layout) = layout else {
+                return Err("some of its nozzles take tips, and that is not imported".to_owned());
+            };
+            let place = self.deck.reached_by(layout, labware, well)?;
+            let wells = self.deck.wells_of(&place);
+            self.tips.insert(id.to_owned(), layout.rows * layout.columns);
+            self.absent.entry(rack.to_owned()).or_default().extend(wells.iter().cloned());
+            self.taken.entry(rack.to_owned()).or_default().extend(wells);
+            self.sizes.insert(id.to_owned(), labware.wells.get(well).map_or(0.0, |tip| tip.capacity));
+            self.aimed.remove(id);
+            self.liquids.empty(id);
+            self.moved.remove(id);
+            self.nodes.push(Node::about("pick up tip ", place, &format!(" by {by}")));
+            return Ok(());
         }
         // Channels that reach no tip stay without one.
         let channels = mounted.pipette.channels;

@@ -57,6 +57,7 @@ enum Bound {
     /// Each of one list with each of another.
     Paired,
     /// A list in groups of a number.
+    Firsts,
     Grouped,
     /// Where a part of a thing is, seen from another part of it.
     Displacement,
@@ -193,6 +194,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("displacement", Bound::Displacement),
     ("droop", Bound::Droop),
     ("footing", Bound::Footing),
+    ("firsts", Bound::Firsts),
     ("grouped", Bound::Grouped),
     ("having", Bound::Having),
     ("interpolate", Bound::Interpolate),
@@ -335,6 +337,7 @@ impl Elaborator<'_> {
             (Bound::Nth, [Value::List(items), Value::Num(n)]) => self.nth(items, n.node, at),
             (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
             (Bound::Grouped, [Value::List(items), Value::Num(n)]) => self.grouped(items, n.node, at),
+            (Bound::Firsts, [Value::List(items), Value::Num(n)]) => self.firsts(items, n.node, at),
             (Bound::Spread, [Value::List(items), Value::Num(n)]) => self.spread(items, n.node, at),
             (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
             (Bound::Displacement, [Value::Frame(a, from), Value::Frame(b, to)]) => {

@@ -83,6 +83,14 @@ impl Elaborator<'_> {
         }
     }
 
+    /// The first of each group of a whole number of elements.
+    pub fn firsts(&mut self, items: &[Value], n: NodeId, at: Span) -> Value {
+        match self.count_before_run(n, "the size of a group", at) {
+            Ok(size) => Value::List(items.iter().step_by(size.unwrap_or(1)).cloned().collect()),
+            Err(()) => Value::Error,
+        }
+    }
+
     /// A whole number from 1 that is known before the run; none in a prototype where it is known only later. What it is not is reported.
     fn count_before_run(&mut self, n: NodeId, what: &str, at: Span) -> Result<Option<usize>, ()> {
         match self.number_before_run(n, what, at) {
