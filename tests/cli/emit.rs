@@ -130,7 +130,7 @@ workflow work in deck {{
 #[test]
 fn what_a_protocol_cannot_say_is_said_at_its_line() {
     let tip = "pick up tip from tips by ot2.left";
-    let cases: [(&str, String, &[&str]); 9] = [
+    let cases: [(&str, String, &[&str]); 8] = [
         (
             "device",
             "heat hotplate to 60 degC\nstop heating hotplate".into(),
@@ -155,11 +155,6 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
             "robots",
             format!("{tip}\npick up tip from more by other.left\ndrop tip by ot2.left\ndrop tip by other.left"),
             &["is for one robot", "a.mtx:17"],
-        ),
-        (
-            "bin",
-            format!("{tip}\ndrop tip into other.trash by ot2.left"),
-            &["`other.trash` is no bin on the deck of `ot2`"],
         ),
         (
             "elsewhere",

@@ -387,7 +387,7 @@ fn a_reader_gives_the_absorbance_over_the_height_of_the_liquid() {
     };
     // 2000 L/(mol cm) and 100 umol/L; 200 uL stand 6.03 mm high in a well that widens from 6.35 to 6.86 mm, 100 uL 3.09 mm.
     let good = around(
-        "close lid reader\nread plate reader\nexpect reading_of(reader, plate[A1]) in 0.1200 .. 0.1210\n\
+        "close lid reader\nscan reader\nexpect reading_of(reader, plate[A1]) in 0.1200 .. 0.1210\n\
          expect reading_of(reader, plate[A2]) in 0.0613 .. 0.0623\nexpect reading_of(reader, plate[A3]) == 0",
     );
     assert_eq!(checked("flex_reads", &text(&good)), (0, "no findings".to_owned()));
@@ -396,9 +396,9 @@ fn a_reader_gives_the_absorbance_over_the_height_of_the_liquid() {
     let ran = matterixc_in(&run, &["run", "a.mtx"]);
     assert_eq!(ran.code, 0, "{}", ran.out);
     let cases = [
-        ("open", around("read plate reader"), "lid-open"),
+        ("open", around("scan reader"), "lid-open"),
         ("dark", "initialize reader at 500 nm".to_owned(), "out-of-range"),
-        ("never", "read plate reader".to_owned(), "never-started"),
+        ("never", "scan reader".to_owned(), "never-started"),
         ("loaded", around("close lid reader\ninitialize reader at 600 nm"), "occupied"),
         ("shut", "initialize reader at 450 nm\nrelocate plate to reader by flex.gripper".to_owned(), "lid-closed"),
     ];

@@ -678,7 +678,7 @@ impl<'a> Steps<'a> {
                 let wavelength = wavelength.as_f64().ok_or("it gives no wavelength")?;
                 self.say(format!("initialize {name} at {} nm{options}", number(wavelength)))
             }
-            "read" => self.say(format!("read plate {name}")),
+            "read" => self.say(format!("scan {name}")),
             "openLid" => self.say(format!("open lid {name}")),
             "closeLid" => self.say(format!("close lid {name}")),
             "setAndWaitForShakeSpeed" => {
