@@ -156,6 +156,9 @@ class Reader:
             case "configureNozzleLayout":
                 # Said where tips are taken.
                 self.layouts[mount] = frozen(params["configurationParams"])
+            case "reloadLabware":
+                # Only what was measured of its place is looked up again.
+                pass
             case "prepareToAspirate":
                 # The plunger goes to its start; what the tip does next says so.
                 pass

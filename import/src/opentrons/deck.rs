@@ -6,6 +6,7 @@ use matterix_lang::labware::{self, Insides};
 use serde_json::Value;
 
 use super::analysis::{Analysis, Command};
+use super::layout::Layout;
 use super::library::{Library, Pipette};
 use super::liquids::Reach;
 use super::node::{At, Place, cell};
@@ -127,15 +128,6 @@ impl Labware {
     fn over(&self, x: f64, y: f64) -> Option<&str> {
         self.order.iter().find(|other| self.wells.get(*other).is_some_and(|o| o.opens_at(x, y))).map(String::as_str)
     }
-}
-
-/// Channels of a head that take tips where not all do: so many rows and columns of them, from a corner of the head.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Layout {
-    /// The nozzle that commands name places of: that in the corner.
-    pub(super) corner: String,
-    pub(super) rows: usize,
-    pub(super) columns: usize,
 }
 
 /// A pipette on its mount.

@@ -5,6 +5,7 @@
 
 mod analysis;
 mod deck;
+mod layout;
 mod library;
 mod liquids;
 mod node;

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use super::analysis::{Analysis, Command};
-use super::deck::{Deck, Kind, Labware, Layout, Mounted};
+use super::deck::{Deck, Kind, Labware, Mounted};
+use super::layout::{self, Layouts};
 use super::liquids::{Holding, Liquids};
-use super::node::{Node, Place, cell};
+use super::node::{Node, Place};
 use super::tips::Refills;
 use super::words::{self, number};
 use crate::LeftOut;
@@ -47,7 +48,7 @@ pub(super) struct Steps<'a> {
     /// What its tips take, uL.
     sizes: BTreeMap<String, f64>,
     /// Which nozzles of a pipette take tips, where not all do; nothing where that is not imported.
-    layouts: BTreeMap<String, Option<Layout>>,
+    layouts: Layouts,
     /// By pipette: the bin that it was brought over.
     aimed: BTreeMap<String, String>,
     /// What modules were set to last, degC.
@@ -100,7 +101,7 @@ impl<'a> Steps<'a> {
             refills: Refills::new(),
             tips: BTreeMap::new(),
             sizes: BTreeMap::new(),
-            layouts: BTreeMap::new(),
+            layouts: Layouts::new(),
             aimed: BTreeMap::new(),
             targets: BTreeMap::new(),
             staying: staying(&analysis.commands),
@@ -159,6 +160,8 @@ impl<'a> Steps<'a> {
             "configureNozzleLayout" => self.lay_out(command),
             // The plunger goes to its start; what the tip does next says so.
             "prepareToAspirate" => Ok(()),
+            // It is where it was; only what was measured of its place is looked up again.
+            "reloadLabware" => Ok(()),
             "aspirate" | "dispense" if command.number("volume") == Some(0.0) => self.move_to(command),
             "aspirate" => self.aspirate(command),
             "dispense" => self.dispense(command),
@@ -249,32 +252,15 @@ impl<'a> Steps<'a> {
     /// All nozzles take tips, or some.
     fn lay_out(&mut self, command: &Command) -> Result<(), String> {
         let (mounted, by) = self.pipette(command)?;
-        let id = command.text("pipetteId").to_owned();
-        let params = &command.params["configurationParams"];
-        let nozzle = |key: &str| params[key].as_str().unwrap_or_default();
-        let corner = nozzle("primaryNozzle").to_owned();
-        let layout = |rows, columns| Some(Layout { corner: corner.clone(), rows, columns });
-        let is_corner = ["A1", "H1", "A12", "H12"].contains(&corner.as_str());
-        let layout = match (params["style"].as_str().unwrap_or_default(), cell(nozzle("backLeftNozzle"))) {
-            ("ALL", _) => {
-                if self.layouts.remove(&id).is_some() {
-                    self.say(format!("lay out {by} from all"))?;
-                }
-                return Ok(());
-            }
-            ("SINGLE", _) if is_corner => layout(1, 1),
-            ("COLUMN", _) if is_corner => layout(mounted.pipette.channels.min(8), 1),
-            ("ROW", _) if is_corner => layout(1, 12),
-            // Some of a column, from the front.
-            ("QUADRANT", Some((back, 1))) if corner == "H1" && nozzle("frontRightNozzle") == "H1" => {
-                layout(9 - back as usize, 1)
-            }
-            _ => None,
-        };
-        let was = self.layouts.insert(id, layout.clone());
-        let Some(layout) = layout else { return Err("the language has no such layout of nozzles".to_owned()) };
-        let is_there = was.flatten().is_some_and(|was| was.corner == layout.corner);
-        if is_there { Ok(()) } else { self.say(format!("lay out {by} from {}", layout.corner)) }
+        let id = command.text("pipetteId");
+        let was = layout::take(&mut self.layouts, command, mounted.pipette.channels);
+        match self.layouts.get(id) {
+            None if was.is_some() => self.say(format!("lay out {by} from all")),
+            None => Ok(()),
+            Some(None) => Err("the language has no such layout of nozzles".to_owned()),
+            Some(Some(layout)) if was.flatten().is_some_and(|was| was.corner == layout.corner) => Ok(()),
+            Some(Some(layout)) => self.say(format!("lay out {by} from {}", layout.corner)),
+        }
     }
 
     /// What a command reaches from a well.
@@ -488,6 +474,10 @@ impl<'a> Steps<'a> {
         if let Some((bin, _)) = self.deck.bins.get(command.text("labwareId")) {
             pass(&mut self.liquids, "", &[]);
             return self.say(format!("{before}{bin}[A1] by {by}{options}"));
+        }
+        let racks = self.deck.labware.get(command.text("labwareId")).filter(|labware| labware.kind == Kind::Tips);
+        if let Some(rack) = racks {
+            return Err(format!("`{}` is a rack of tips, and takes no liquid", rack.name));
         }
         let spot = self.spot(command)?;
         pass(&mut self.liquids, &spot.place.of, &self.deck.wells_of(&spot.place));
