@@ -57,7 +57,7 @@ pub(super) enum Holds {
     Shift,
     /// A bin or a chute for tips.
     Bin,
-    /// For a chute, how many channels go there.
+    /// How many channels a pipette has, in all or in each row.
     Channels,
     /// A labware definition by `NAMESPACE/NAME/VERSION`.
     Definition,
@@ -124,7 +124,12 @@ use Holds::{Definition, Flag, Location, Number, Text, Well};
 
 /// All of them.
 const FORMS: &[Form] = &[
-    form("loadPipette", About::Pipette, &[("pipetteName", Text), ("mount", Text)], &[]),
+    form(
+        "loadPipette",
+        About::Pipette,
+        &[("pipetteName", Text), ("mount", Text)],
+        &[("channels", Holds::Channels), ("rows", Holds::Channels)],
+    ),
     form("loadLabware", About::Labware, &[("definition", Definition), ("location", Location)], &[]),
     form("moveLabware", About::Labware, &[("newLocation", Location), ("strategy", Text)], &[]),
     // What the gripper does, which the run engine calls `moveLabware` too.

@@ -22,16 +22,18 @@ pub(super) enum Layout {
 
 impl Layout {
     /// The layout that takes the tips in places with these labels, from a corner of the head; none where no layout does.
-    pub(super) fn of(corner: &str, labels: &[&str]) -> Option<Layout> {
-        if corner == "all" {
+    pub(super) fn of(corner: &str, labels: &[&str], channels: usize) -> Option<Layout> {
+        if corner == "all" || labels.len() == channels {
             return Some(Layout::All);
         }
         let row = |label: &str| label.chars().next();
         let corner = corner.to_owned();
         match labels {
             [_] => Some(Layout::Single(corner)),
-            [first, second, ..] if row(first) == row(second) => Some(Layout::Row(corner)),
-            many if many.len() == 8 => Some(Layout::Column(corner)),
+            [first, second, ..] if row(first) == row(second) => {
+                ["A1", "H1"].contains(&corner.as_str()).then_some(Layout::Row(corner))
+            }
+            many if many.len() == 8 => ["A1", "A12"].contains(&corner.as_str()).then_some(Layout::Column(corner)),
             many if many.len() < 8 && corner == "H1" => {
                 let back = char::from(b'H' + 1 - many.len() as u8);
                 Some(Layout::Part { front: corner, back: format!("{back}1") })
@@ -57,7 +59,6 @@ impl Layout {
     pub(super) fn names_front(&self) -> bool {
         match self {
             Layout::Part { .. } => true,
-            Layout::Column(corner) => corner.starts_with('H'),
             _ => false,
         }
     }

@@ -75,6 +75,7 @@ impl<'p> Protocol<'p> {
             moved: moved(subject, performance, &origins),
             later: BTreeMap::new(),
             off: BTreeSet::new(),
+            channels: BTreeMap::new(),
             layouts: BTreeMap::new(),
             corners: BTreeMap::new(),
             origins,

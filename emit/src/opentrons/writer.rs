@@ -32,6 +32,8 @@ pub(super) struct Writer<'p, 'f> {
     pub(super) moved: BTreeMap<InstanceId, bool>,
     /// Labware that stands off the deck now.
     pub(super) off: BTreeSet<InstanceId>,
+    /// How many channels pipettes have.
+    pub(super) channels: BTreeMap<InstanceId, usize>,
     /// Which nozzles of pipettes take tips.
     pub(super) layouts: BTreeMap<InstanceId, Layout>,
     /// From which corner of a head tips are taken next.
@@ -112,6 +114,11 @@ impl Writer<'_, '_> {
         if message.form.about != About::Well && self.deck.get(wired.device).is_none() {
             self.deck.load(wired.device, message.form.about);
         }
+        if message.form.name == "loadPipette"
+            && let Err(d) = self.known_head(wired.device, &message, at)
+        {
+            return self.found.push(d);
+        }
         if message.form.about == About::Bin {
             let slot = super::deck::label(message.get("location").unwrap_or_default()).to_owned();
             let waste = if message.form.name == TRASH_BIN { Waste::Bin(slot) } else { Waste::Chute };
@@ -184,6 +191,32 @@ impl Writer<'_, '_> {
         }
     }
 
+    /// Keeps how many channels a pipette has, if it has those of the one at Opentrons that it is called after.
+    fn known_head(&mut self, device: InstanceId, message: &Message<'_>, at: Span) -> Result<(), Diagnostic> {
+        let [model, channels, rows] =
+            ["pipetteName", "channels", "rows"].map(|field| message.get(field).unwrap_or_default());
+        let parsed = |text: &str| text.parse::<usize>().unwrap_or(0);
+        let (channels, rows) = (parsed(channels), parsed(rows));
+        self.channels.insert(device, channels);
+        let expected = match model {
+            m if m.ends_with("_96") => 96,
+            m if m.contains("_multi") => 8,
+            m if m.contains("_single") => 1,
+            _ => {
+                let headline = format!("`{}` is not called after a pipette of Opentrons", self.name(device));
+                let label = format!("its `model` is \"{model}\"");
+                return Err(not_expressible(at, headline, label).help("such a name is `p300_multi_gen2`"));
+            }
+        };
+        if channels == expected && rows == expected.min(8) {
+            return Ok(());
+        }
+        let headline = format!("`{}` has other channels than a `{model}`", self.name(device));
+        let label =
+            format!("{channels} in rows of {rows}, and that pipette has {expected} in rows of {}", expected.min(8));
+        Err(not_expressible(at, headline, label))
+    }
+
     /// Says which nozzles take tips, where that is not as it was.
     fn lay_out(&mut self, device: InstanceId, message: &Message<'_>, at: Span) -> Result<(), Diagnostic> {
         if message.form.name != "pickUpTip" {
@@ -191,9 +224,13 @@ impl Writer<'_, '_> {
         }
         let places = names(message.get("well").unwrap_or_default());
         let labels: Vec<&str> = places.iter().map(|place| super::deck::label(place)).collect();
-        let Some(layout) = Layout::of(self.corners.get(&device).map_or("all", String::as_str), &labels) else {
+        let Some(layout) = Layout::of(
+            self.corners.get(&device).map_or("all", String::as_str),
+            &labels,
+            self.channels.get(&device).copied().unwrap_or(1),
+        ) else {
             let headline = format!("{WHAT} has no layout of nozzles for these {} tips", labels.len());
-            let help = "take one tip, a row, a column, or fewer than eight from `H1`";
+            let help = "take one tip, a column from `A1` or `A12`, a row from `A1` or `H1`, or fewer than eight of a column from `H1`";
             return Err(not_expressible(at, headline, "this step takes them").help(help));
         };
         if self.layouts.get(&device).unwrap_or(&Layout::All) != &layout {

@@ -44,7 +44,7 @@ pub(super) struct Trouble {
 }
 
 /// One command.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Command {
     pub(super) command_type: String,
@@ -102,6 +102,11 @@ impl Command {
     /// A number among its parameters.
     pub(super) fn number(&self, name: &str) -> Option<f64> {
         self.params[name].as_f64()
+    }
+
+    /// What its stroke is more than its volume, uL, because of the liquid class.
+    pub(super) fn correction(&self) -> f64 {
+        self.number("correctionVolume").unwrap_or(0.0)
     }
 
     /// Its volume, uL; 0 where it gives none.

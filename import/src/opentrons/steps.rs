@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::analysis::{Analysis, Command};
 use super::deck::{Deck, Kind, Labware, Mounted};
@@ -25,6 +25,9 @@ const TOUCH: f64 = -1.0;
 /// What is switched off without having been on is switched off as a precaution.
 const ANYWAY: &str = " { anyway: true }";
 
+/// Below this pipettes of 50 uL have a mode of their own, uL.
+const LOW: f64 = 5.0;
+
 /// How commands say that the gripper moves labware.
 pub(super) const BY_GRIPPER: &str = "usingGripper";
 
@@ -35,8 +38,8 @@ pub(super) struct Steps<'a> {
     pub(super) nodes: Vec<Node>,
     pub(super) left_out: Vec<LeftOut>,
     pub(super) liquids: Liquids,
-    /// By pipette, where it was moved to last: labware, well, and mm above the rim.
-    moved: BTreeMap<String, (String, String, f64)>,
+    /// By pipette, where it was moved to last: labware, well, and mm above the rim, aside of the axis last.
+    moved: BTreeMap<String, (String, String, f64, [f64; 2])>,
     /// Tips that were taken, by rack.
     taken: BTreeMap<String, BTreeSet<String>>,
     /// Places without a tip, by rack: those that were taken and not returned.
@@ -45,6 +48,8 @@ pub(super) struct Steps<'a> {
     refills: Refills,
     /// How many channels of a pipette have tips, where it has any.
     tips: BTreeMap<String, usize>,
+    /// By pipette: the volume in its tips, uL, and what the strokes were more than that.
+    drawn: BTreeMap<String, [f64; 2]>,
     /// What its tips take, uL.
     sizes: BTreeMap<String, f64>,
     /// Which nozzles of a pipette take tips, where not all do; nothing where that is not imported.
@@ -100,6 +105,7 @@ impl<'a> Steps<'a> {
             absent: BTreeMap::new(),
             refills: Refills::new(),
             tips: BTreeMap::new(),
+            drawn: BTreeMap::new(),
             sizes: BTreeMap::new(),
             layouts: Layouts::new(),
             aimed: BTreeMap::new(),
@@ -162,6 +168,9 @@ impl<'a> Steps<'a> {
             "prepareToAspirate" => Ok(()),
             // It is where it was; only what was measured of its place is looked up again.
             "reloadLabware" => Ok(()),
+            // The tip that is taken next is named where it is taken.
+            "getNextTip" => Ok(()),
+            "configureForVolume" => self.configure(command),
             "aspirate" | "dispense" if command.number("volume") == Some(0.0) => self.move_to(command),
             "aspirate" => self.aspirate(command),
             "dispense" => self.dispense(command),
@@ -295,7 +304,9 @@ impl<'a> Steps<'a> {
     fn work(&mut self, command: &Command, before: &str, by: &str, spot: Spot, usual: f64, options: &str) {
         let behind = format!("{by}{}{options}", height(spot.above, spot.depth, Some(usual)));
         self.nodes.push(Node::about(before, spot.place, &behind));
-        let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned(), spot.above);
+        let aside = ["x", "y"].map(|axis| command.params["wellLocation"]["offset"][axis].as_f64().unwrap_or(0.0));
+        let here = (command.text("labwareId").to_owned(), command.text("wellName").to_owned(), spot.above, aside);
+        self.aimed.remove(command.text("pipetteId"));
         self.moved.insert(command.text("pipetteId").to_owned(), here);
     }
 
@@ -369,10 +380,14 @@ impl<'a> Steps<'a> {
     fn give_in_place(&mut self, command: &Command) -> Result<(), String> {
         let id = command.text("pipetteId");
         let (_, by) = self.pipette(command)?;
-        let Some((bin, _)) = self.aimed.get(id).and_then(|area| self.deck.bins.get(area)) else {
-            return Err("it is done at the position of the tip, which is not at a bin".to_owned());
-        };
         let blows = command.command_type == "blowOutInPlace";
+        let Some((bin, _)) = self.aimed.get(id).and_then(|area| self.deck.bins.get(area)) else {
+            return match self.here(command) {
+                Some((there, _)) if blows => self.blow_out(&there),
+                Some((there, _)) => self.dispense(&there),
+                None => Err("it is done at the position of the tip, which is not known".to_owned()),
+            };
+        };
         let flow = if blows { Flow::Blow } else { Flow::Out };
         let options = self.options(command, Some(flow), &[]);
         match blows {
@@ -391,6 +406,7 @@ impl<'a> Steps<'a> {
     fn bare(&mut self, command: &Command) {
         let id = command.text("pipetteId");
         self.liquids.empty(id);
+        self.drawn.remove(id);
         self.moved.remove(id);
         self.tips.remove(id);
     }
@@ -424,7 +440,7 @@ impl<'a> Steps<'a> {
         let spot = self.spot(command)?;
         // What is aspirated at the rim or above it is air.
         if spot.above > -DUST {
-            let is_there = self.moved.get(id).is_some_and(|(labware, well, height)| {
+            let is_there = self.moved.get(id).is_some_and(|(labware, well, height, _)| {
                 labware == command.text("labwareId")
                     && well == command.text("wellName")
                     && (height - spot.above).abs() < DUST
@@ -437,9 +453,15 @@ impl<'a> Steps<'a> {
         let reach = self.deck.reach(&spot.place, spot.above + spot.depth);
         let (how, wells) = ((self.channels(command)?, reach), self.deck.wells_of(&spot.place));
         let lacks = self.liquids.aspirate(id, command.volume(), how, &spot.place.of, &wells);
-        let more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
+        let mut more = if lacks { vec!["partial: true".to_owned()] } else { Vec::new() };
+        let [volume, beyond] = self.drawn.entry(id.to_owned()).or_default();
+        *volume += command.volume();
+        *beyond += command.correction();
+        if command.correction().abs() > DUST {
+            more.push(format!("fix: {} uL", number(command.correction())));
+        }
         let options = self.options(command, Some(Flow::In), &more);
-        let before = format!("aspirate {} uL from ", number(command.volume()));
+        let before = format!("aspirate {} uL from ", number(command.volume() + command.correction()));
         let usual = DIP - spot.depth;
         self.work(command, &before, &format!(" by {by}"), spot, usual, &options);
         Ok(())
@@ -447,13 +469,30 @@ impl<'a> Steps<'a> {
 
     fn dispense(&mut self, command: &Command) -> Result<(), String> {
         let volume = command.volume();
-        let before = format!("dispense {} uL into ", number(volume));
+        let before = format!("dispense {} uL into ", number(volume + self.corrected(command)));
         self.give(command, &before, Flow::Out, |liquids, labware, wells| {
             liquids.dispense(command.text("pipetteId"), volume, labware, wells);
         })
     }
 
+    /// A pipette changes its mode only for volumes below the smallest of its usual one.
+    fn configure(&self, command: &Command) -> Result<(), String> {
+        let (mounted, _) = self.pipette(command)?;
+        match mounted.pipette.asset.starts_with("FlexP50") && command.volume() < LOW {
+            true => Err("the language has no mode for small volumes".to_owned()),
+            false => Ok(()),
+        }
+    }
+
+    /// What a stroke that empties the tip is more than its volume: as much as those were that filled it.
+    fn corrected(&mut self, command: &Command) -> f64 {
+        let Some([volume, more]) = self.drawn.get_mut(command.text("pipetteId")) else { return 0.0 };
+        *volume -= command.volume();
+        if *volume < 1e-6 { std::mem::take(more) } else { 0.0 }
+    }
+
     fn blow_out(&mut self, command: &Command) -> Result<(), String> {
+        self.drawn.remove(command.text("pipetteId"));
         self.give(command, "blow out into ", Flow::Blow, |liquids, labware, wells| {
             liquids.blow_out(command.text("pipetteId"), labware, wells);
         })
@@ -535,14 +574,25 @@ impl<'a> Steps<'a> {
 
     fn air(&mut self, command: &Command) -> Result<(), String> {
         let (_, by) = self.pipette(command)?;
-        if self.moved.get(command.text("pipetteId")).is_some_and(|(_, _, above)| *above < 0.0) {
-            return Err("it aspirates at the position of the tip, in a well".to_owned());
+        match self.here(command).filter(|(_, is_in_well)| *is_in_well && command.command_type == "aspirateInPlace") {
+            Some((there, _)) => self.aspirate(&there),
+            None => self.air_gap(command, &by),
         }
-        self.air_gap(command, &by)
+    }
+
+    /// A command that is carried out where the tip is as one that names the place, and whether that is in a well.
+    fn here(&self, command: &Command) -> Option<(Command, bool)> {
+        let (labware, well, above, [x, y]) = self.moved.get(command.text("pipetteId"))?;
+        let mut there = command.clone();
+        there.params["labwareId"] = labware.as_str().into();
+        there.params["wellName"] = well.as_str().into();
+        there.params["wellLocation"] = json!({ "origin": "top", "offset": { "x": x, "y": y, "z": above } });
+        Some((there, *above < 0.0))
     }
 
     fn air_gap(&mut self, command: &Command, by: &str) -> Result<(), String> {
         self.liquids.air(command.text("pipetteId"), command.volume());
+        self.drawn.entry(command.text("pipetteId").to_owned()).or_default()[0] += command.volume();
         let options = self.options(command, Some(Flow::In), &[]);
         self.say(format!("air gap {} uL by {by}{options}", number(command.volume())))
     }
@@ -634,6 +684,7 @@ impl<'a> Steps<'a> {
                 self.heat(&name, command.number("celsius").ok_or("it gives no temperature")?, None)
             }
             "runProfile" => self.profile(&name, command),
+            "runExtendedProfile" => self.extended_profile(&name, command),
             // The module counts the time from when it is there.
             "waitForBlockTemperature" if self.holds.contains_key(&name) => {
                 self.say(format!("settle {name}"))?;
@@ -693,6 +744,22 @@ impl<'a> Steps<'a> {
         let stays = self.staying.contains(&self.at).then(|| "stays: true".to_owned());
         let options = words::braced(&volume.into_iter().chain(stays).collect::<Vec<_>>());
         self.say(format!("heat {module} to {} degC{options}", number(celsius)))
+    }
+
+    /// Temperatures, and cycles of them.
+    fn extended_profile(&mut self, module: &str, command: &Command) -> Result<(), String> {
+        let elements = command.params["profileElements"].as_array().ok_or("it gives no profile")?;
+        for element in elements {
+            let mut part = command.clone();
+            part.params["profile"] = match &element["steps"] {
+                Value::Null => json!([element]),
+                steps => steps.clone(),
+            };
+            for _ in 0..element["repetitions"].as_u64().unwrap_or(1) {
+                self.profile(module, &part)?;
+            }
+        }
+        Ok(())
     }
 
     /// The temperatures of a profile, each held for its time.
