@@ -125,7 +125,7 @@ class Reader:
                 self.say(kind, mount, self.at[mount], volume, flow, params.get("pushOut"))
             case "aspirateInPlace" | "dispenseInPlace" | "blowOutInPlace" | "airGapInPlace":
                 verb = {"aspirateInPlace": "aspirate", "airGapInPlace": "aspirate", "dispenseInPlace": "dispense"}.get(kind, "blowout")
-                self.say(verb, mount, self.at.get(mount), volume, flow)
+                self.say(verb, mount, self.at.get(mount), volume, flow, params.get("pushOut"))
             case "touchTip":
                 spot = self.spot(params)
                 self.at[mount] = spot
