@@ -440,3 +440,124 @@ fn pipettes_do_not_reach_the_staging_places() {
         checked("flex_staging", &lab("FlexP1000Single, FlexTips200", "left: FlexP1000Single, ", things, steps));
     assert!(code == 1 && said.contains("plate[A1]"), "{said}");
 }
+
+#[test]
+fn strokes_at_the_place_of_the_tip_keep_what_their_class_corrects() {
+    let here = |name: &str, more: Value| {
+        let mut params = json!({ "pipetteId": "p" });
+        if let (Some(params), Value::Object(more)) = (params.as_object_mut(), more) {
+            params.extend(more);
+        }
+        command(name, params)
+    };
+    let to = |labware: &str, place: &str, above: f64| {
+        let mut there = well("moveToWell", labware, place, json!({}));
+        there["params"]["wellLocation"] = json!({ "origin": "top", "offset": { "x": 0.0, "y": 0.0, "z": above } });
+        there
+    };
+    let steps = vec![
+        module("cycler", "thermocyclerModuleV2", "B1"),
+        load("tips", "opentrons_flex_96_tiprack_200ul", slot("C2"), (8, 12), [97.0, 200.0]),
+        load("plate", "nest_96_wellplate_200ul_flat", slot("C3"), (8, 12), [10.8, 200.0]),
+        well("pickUpTip", "tips", "A1", json!({})),
+        here("configureForVolume", json!({ "volume": 100.0 })),
+        to("plate", "A1", -8.8),
+        here("aspirateInPlace", json!({ "volume": 100.0, "flowRate": 100.0, "correctionVolume": -1.75 })),
+        to("plate", "A1", 2.0),
+        here("airGapInPlace", json!({ "volume": 10.0, "flowRate": 12.0, "correctionVolume": -2.0 })),
+        to("plate", "A2", 2.0),
+        here(
+            "dispenseInPlace",
+            json!({ "volume": 10.0, "flowRate": 100.0, "pushOut": 0.0, "correctionVolume": -1.75 }),
+        ),
+        to("plate", "A2", -8.8),
+        here("dispenseInPlace", json!({ "volume": 100.0, "flowRate": 100.0, "pushOut": 3.0 })),
+        here("moveToAddressableAreaForDropTip", json!({ "addressableAreaName": "movableTrashA3" })),
+        here("dropTipInPlace", json!({})),
+        command(
+            "thermocycler/runExtendedProfile",
+            json!({ "moduleId": "cycler", "blockMaxVolumeUl": 30.0, "profileElements": [
+            { "celsius": 95.0, "holdSeconds": 60.0 },
+            { "steps": [{ "celsius": 95.0, "holdSeconds": 10.0 }, { "celsius": 55.0, "holdSeconds": 5.0 }], "repetitions": 30 },
+        ] }),
+        ),
+        command("thermocycler/deactivateBlock", json!({ "moduleId": "cycler" })),
+    ];
+    let (text, _) = there_and_back("flex_corrected", analysis("p1000_single_flex", steps));
+    for line in [
+        "aspirate 98.25 uL from plate[A1] by flex.left at bottom + 2 mm { fix: -1.75 uL, rate: 100 uL/s }",
+        "air gap 10 uL by flex.left { rate: 12 uL/s }",
+        "dispense 10 uL into plate[A2] by flex.left at top + 2 mm { push_out: 0 uL, rate: 100 uL/s }",
+        "dispense 98.25 uL into plate[A2] by flex.left at bottom + 2 mm { push_out: 3 uL, rate: 100 uL/s }",
+        "    repeat 30 times {\n        heat cycler to 95 degC { volume: 30 uL }\n        settle cycler\n        wait 10 s",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+}
+
+#[test]
+fn rules_and_strokes_that_cannot_be_are_refused() {
+    let things = "tips = FlexTips200 on flex.slot[C2]\nplate = Corning96 on flex.slot[D2]\n\
+                  bath = Reservoir12 on flex.slot[B2] holding { A1: 10 mL of water }\nodd = Odd";
+    let rule = |tip: &str, fix: &str| {
+        format!(
+            "Rule {{ model: \"p1000_single_flex\", tip: {tip}, rates_in: [(1 uL, 40 uL/s), (200 uL, 40 uL/s)], \
+             rates_out: [(1 uL, 40 uL/s), (200 uL, 40 uL/s)], fixes: [(1 uL, {fix}), (200 uL, {fix})] }}"
+        )
+    };
+    let text = |rules: &str, step: &str| {
+        let steps = format!("pick up tip from tips by flex.left\n{step}\ndrop tip by flex.left");
+        let text = lab("FlexP1000Single, FlexTips200", "left: FlexP1000Single, ", things, &steps);
+        text.replace("lab deck", &format!("asset Odd: LiquidClass {{\n{rules}\n}}\nlab deck"))
+    };
+    let one = format!("rules[1] = {}", rule("200 uL", "-2 uL"));
+    let deliver = "deliver 100 uL from bath[A1] to plate[A1] by flex.left using odd";
+    assert_eq!(checked("flex_rule", &text(&one, deliver)), (0, "no findings".to_owned()));
+    let cases = [
+        ("two", format!("{one}\nrules[2] = {}", rule("200 uL", "1 uL")), deliver, "has 2 rules"),
+        ("other", format!("rules[1] = {}", rule("50 uL", "1 uL")), deliver, "has no rule"),
+        (
+            "full",
+            format!("rules[1] = {}", rule("200 uL", "-30 uL")),
+            "deliver 210 uL from bath[A1] to plate[A1] by flex.left using odd",
+            "tip-overflow",
+        ),
+        ("wild", one.clone(), "aspirate 50 uL from bath[A1] by flex.left { fix: -60 uL }", "cannot be corrected"),
+        (
+            "rest",
+            one.clone(),
+            "aspirate 50 uL from bath[A1] by flex.left\ndispense 20 uL into plate[A1] by flex.left { push_out: 5 uL }",
+            "tip-not-empty",
+        ),
+        (
+            "one",
+            one.clone(),
+            "drop tip by flex.left\nlay out flex.left from H1\npick up tip from tips by flex.left",
+            "has one channel",
+        ),
+    ];
+    for (name, rules, step, said) in cases {
+        let (code, found) = checked(&format!("flex_rule_{name}"), &text(&rules, step));
+        assert!(code == 1 && found.contains(said), "{name}: {found}");
+    }
+}
+
+#[test]
+fn a_head_with_other_channels_than_its_model_is_not_emitted() {
+    let dir = folder("flex_head");
+    let text = "mtx 1\nuse std::opentrons::{Corning96, OT2, OpentronsPipette, TipRack300}\n\
+                asset Four: OpentronsPipette {\n    model: \"MODEL\"\n    channels[1 .. 4] = Nozzle {} at (0, 0, 0) mm pitch (9, 9) mm by 1\n\
+                volumes: 20 uL .. 300 uL\n    fits: 200 uL .. 300 uL\n    flow: 90 uL/s\n}\n\
+                lab deck {\n    ambient: 22 degC\n    ot2 = OT2 { left: Four } at (0, 0, 0) m\n    tips = TipRack300 on ot2.slot[1]\n\
+                plate = Corning96 on ot2.slot[2] holding { A1 .. H1: 200 uL of water }\n}\n\
+                workflow w in deck {\n    pick up tip from tips by ot2.left\n    aspirate 50 uL from plate[A1 .. D1] by ot2.left\n\
+                dispense 50 uL into plate[A2 .. D2] by ot2.left\n    drop tip by ot2.left\n}\n";
+    for (model, said) in [
+        ("p300_multi_gen2", "other channels than a `p300_multi_gen2`"),
+        ("four", "not called after a pipette of Opentrons"),
+    ] {
+        write(&dir, "a.mtx", text.replace("MODEL", model));
+        let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+        assert!(emitted.code == 1 && flat(&emitted.err).contains(said), "{model}: {}{}", emitted.out, emitted.err);
+    }
+}
