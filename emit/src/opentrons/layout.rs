@@ -57,9 +57,6 @@ impl Layout {
 
     /// Whether commands name the place of the front channel instead of the back one.
     pub(super) fn names_front(&self) -> bool {
-        match self {
-            Layout::Part { .. } => true,
-            _ => false,
-        }
+        matches!(self, Layout::Part { .. })
     }
 }
