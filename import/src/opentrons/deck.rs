@@ -111,17 +111,22 @@ impl Labware {
     /// The well over which each of so many channels in a row is, if any, where the first one is over the middle of this well.
     pub(super) fn row(&self, channels: usize, well: &str) -> Vec<Option<&str>> {
         let Some(first) = self.wells.get(well) else { return vec![None; channels] };
-        self.under(channels, [first.x, first.y])
+        self.under([channels.min(ROWS), channels.div_ceil(ROWS)], [first.x, first.y])
     }
 
-    /// The same where the first one is at a place.
-    fn under(&self, channels: usize, [x, y]: [f64; 2]) -> Vec<Option<&str>> {
-        let at = |channel: usize| {
-            let (column, row) = (channel / ROWS, channel % ROWS);
-            let (x, y) = (x + PITCH * column as f64, y - PITCH * row as f64);
-            self.over(x, y)
-        };
-        (0..channels).map(at).collect()
+    /// The well over which each of so many rows and columns of channels is, if any, where the first one is at a place; column by column.
+    fn under(&self, [rows, columns]: [usize; 2], [x, y]: [f64; 2]) -> Vec<Option<&str>> {
+        let cells = (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)));
+        cells.map(|(column, row)| self.over(x + PITCH * column as f64, y - PITCH * row as f64)).collect()
+    }
+
+    /// How wells in the order of the channels over them are named together.
+    fn named_together(&self, wells: Vec<&str>) -> At {
+        match cell(wells[0]) {
+            Some((1, number)) if wells == self.column(wells[0]) => At::Column(number as usize, self.columns()),
+            Some((row, 1)) if wells == self.across(row) => At::Row(row as usize),
+            _ => At::Wells(wells.into_iter().map(str::to_owned).collect()),
+        }
     }
 
     /// The well whose opening is at a place, mm.
@@ -284,16 +289,7 @@ impl Deck {
         if channels == 1 || labware.is_centred {
             return at(At::Well(well.to_owned()));
         }
-        let Some(reached) = labware.row(channels, well).into_iter().collect::<Option<Vec<&str>>>() else {
-            return Err("some of its channels reach no well".to_owned());
-        };
-        if reached.windows(2).any(|two| two[0] == two[1]) {
-            return Err("several of its channels reach one well, and not in its middle".to_owned());
-        }
-        match cell(well) {
-            Some((1, number)) if reached == labware.column(well) => at(At::Column(number as usize, labware.columns())),
-            _ => at(At::Wells(reached.into_iter().map(str::to_owned).collect())),
-        }
+        at(labware.named_together(each_its_own(labware.row(channels, well))?))
     }
 
     /// What the channels of a layout reach where that in the corner is over a well, or why it is nothing that can be said.
@@ -307,23 +303,8 @@ impl Deck {
         let behind = |many: usize, is_last: bool| if is_last { PITCH * (many - 1) as f64 } else { 0.0 };
         let x = named.x - behind(layout.columns, layout.corner.ends_with("12"));
         let y = named.y + behind(layout.rows, layout.corner.starts_with('H'));
-        let cells = (0..layout.columns).flat_map(|column| (0..layout.rows).map(move |row| (column, row)));
-        let reached = cells.map(|(column, row)| labware.over(x + PITCH * column as f64, y - PITCH * row as f64));
-        let Some(reached) = reached.collect::<Option<Vec<&str>>>() else {
-            return Err("some of its channels reach no well".to_owned());
-        };
-        if reached.windows(2).any(|two| two[0] == two[1]) {
-            return Err("several of its channels reach one well, and not in its middle".to_owned());
-        }
-        let at = match cell(reached[0]) {
-            Some((1, number)) if reached == labware.column(reached[0]) => {
-                At::Column(number as usize, labware.columns())
-            }
-            Some((row, 1)) if reached == labware.across(row) => At::Row(row as usize),
-            _ if reached == labware.order => At::All(labware.kind == Kind::Tips),
-            _ => At::Wells(reached.into_iter().map(str::to_owned).collect()),
-        };
-        Ok(Place { of, at })
+        let wells = each_its_own(labware.under([layout.rows, layout.columns], [x, y]))?;
+        Ok(Place { of, at: labware.named_together(wells) })
     }
 
     /// The same of several rows of channels: all wells over which any is.
@@ -337,20 +318,17 @@ impl Deck {
             (true, 1) => [half(channels / ROWS), half(ROWS)],
             (true, _) => [0.0, half(ROWS)],
         };
-        let under = labware.under(channels, [first.x - left, first.y + back]);
-        let Some(under) = under.into_iter().collect::<Option<Vec<&str>>>() else {
-            return Err("some of its channels reach no well".to_owned());
-        };
-        let mut wells: Vec<String> = Vec::new();
-        for one in under {
-            if !wells.iter().any(|known| known == one) {
-                wells.push(one.to_owned());
+        let under = labware.under([ROWS, channels / ROWS], [first.x - left, first.y + back]);
+        let mut wells: Vec<&str> = Vec::new();
+        for well in all_over(under)? {
+            if !wells.contains(&well) {
+                wells.push(well);
             }
         }
         let at = match wells.as_slice() {
-            [one] => At::Well(one.clone()),
+            [one] => At::Well((*one).to_owned()),
             all if *all == labware.order => At::All(labware.kind == Kind::Tips),
-            _ => At::Wells(wells),
+            _ => At::Wells(wells.into_iter().map(str::to_owned).collect()),
         };
         Ok(Place { of, at })
     }
@@ -387,6 +365,20 @@ impl Deck {
                 order.iter().filter(|w| cell(w).is_some_and(|(_, c)| c as usize == *number)).cloned().collect()
             }
         }
+    }
+}
+
+/// The wells under channels, each of which is over one.
+fn all_over(under: Vec<Option<&str>>) -> Result<Vec<&str>, String> {
+    under.into_iter().collect::<Option<_>>().ok_or_else(|| "some of its channels reach no well".to_owned())
+}
+
+/// The same where each channel is over a well of its own.
+fn each_its_own(under: Vec<Option<&str>>) -> Result<Vec<&str>, String> {
+    let wells = all_over(under)?;
+    match wells.windows(2).any(|two| two[0] == two[1]) {
+        true => Err("several of its channels reach one well, and not in its middle".to_owned()),
+        false => Ok(wells),
     }
 }
 

@@ -72,29 +72,28 @@ impl Library {
     fn read_module(&mut self, module: &str) {
         let Some(index) = library::MODULES.iter().position(|known| known.name == module) else { return };
         let (file, _) = library::read(index, FileId(u32::MAX));
-        let out = self;
         for item in &file.items {
             let ItemKind::Asset { name, source, extends, lines, .. } = &item.kind else { continue };
             let asset = name.text.clone();
             if module == FLEX {
-                out.of_flex.insert(asset.clone());
+                self.of_flex.insert(asset.clone());
             }
             let field = |key: &str| lines.iter().find_map(|line| value(line, key));
             if let Some((kind, definition)) = source
                 && kind.text == "labware"
             {
-                out.labware.insert(definition.text.clone(), asset.clone());
+                self.labware.insert(definition.text.clone(), asset.clone());
             }
             if let Some(uri) = field("definition").and_then(text)
                 && let Some((_, named)) = uri.split_once('/')
             {
-                out.labware.insert(named.to_owned(), asset.clone());
+                self.labware.insert(named.to_owned(), asset.clone());
             }
             let Some(model) = field("model").and_then(text) else {
                 let bases = extends.iter().filter_map(|path| path.segments.last());
-                let known = |base: &str| out.modules.iter().find(|(_, asset)| *asset == base).map(|(model, _)| model);
+                let known = |base: &str| self.modules.iter().find(|(_, asset)| *asset == base).map(|(model, _)| model);
                 if let Some(model) = bases.filter_map(|base| known(&base.text)).next().cloned() {
-                    out.flex_modules.insert(model, asset);
+                    self.flex_modules.insert(model, asset);
                 }
                 continue;
             };
@@ -116,9 +115,9 @@ impl Library {
                     });
                     let by_tip = by_tip.into();
                     let pipette = Pipette { asset, channels, flow, others, by_tip, is_flex: module == FLEX };
-                    out.pipettes.insert(model.to_owned(), pipette);
+                    self.pipettes.insert(model.to_owned(), pipette);
                 }
-                None => drop(out.modules.insert(model.to_owned(), asset)),
+                None => drop(self.modules.insert(model.to_owned(), asset)),
             }
         }
     }

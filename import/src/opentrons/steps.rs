@@ -321,15 +321,8 @@ impl<'a> Steps<'a> {
             let Some(layout) = layout else {
                 return Err("some of its nozzles take tips, and that is not imported".to_owned());
             };
-            let place = self.deck.reached_by(layout, labware, well)?;
-            let wells = self.deck.wells_of(&place);
-            self.tips.insert(id.to_owned(), layout.rows * layout.columns);
-            self.absent.entry(rack.to_owned()).or_default().extend(wells.iter().cloned());
-            self.taken.entry(rack.to_owned()).or_default().extend(wells);
-            self.sizes.insert(id.to_owned(), labware.wells.get(well).map_or(0.0, |tip| tip.capacity));
-            self.aimed.remove(id);
-            self.liquids.empty(id);
-            self.moved.remove(id);
+            let (place, tips) = (self.deck.reached_by(layout, labware, well)?, layout.rows * layout.columns);
+            self.has_tips(command, labware, &place, tips);
             self.nodes.push(Node::about("pick up tip ", place, &format!(" by {by}")));
             return Ok(());
         }
@@ -347,18 +340,12 @@ impl<'a> Steps<'a> {
         }
         let place = self.deck.reached(tips, labware, well)?;
         let wells = self.deck.wells_of(&place);
-        absent.extend(wells.iter().cloned());
         let taken = self.taken.entry(rack.to_owned()).or_default();
         let next = labware.order.iter().find(|well| !taken.contains(*well));
         let in_order = tips == channels
             && next.is_some_and(|next| wells.first() == Some(next))
             && taken.len().is_multiple_of(wells.len());
-        taken.extend(wells);
-        self.tips.insert(id.to_owned(), tips);
-        self.sizes.insert(id.to_owned(), labware.wells.get(well).map_or(0.0, |tip| tip.capacity));
-        self.aimed.remove(id);
-        self.liquids.empty(id);
-        self.moved.remove(id);
+        self.has_tips(command, labware, &place, tips);
         match in_order {
             true => self.say(format!("pick up tip from {} by {by}", place.of)),
             false => {
@@ -366,6 +353,20 @@ impl<'a> Steps<'a> {
                 Ok(())
             }
         }
+    }
+
+    /// A pipette has so many tips from a place of a rack.
+    fn has_tips(&mut self, command: &Command, labware: &Labware, place: &Place, tips: usize) {
+        let (id, rack) = (command.text("pipetteId"), command.text("labwareId"));
+        let wells = self.deck.wells_of(place);
+        self.absent.entry(rack.to_owned()).or_default().extend(wells.iter().cloned());
+        self.taken.entry(rack.to_owned()).or_default().extend(wells);
+        self.tips.insert(id.to_owned(), tips);
+        let size = labware.wells.get(command.text("wellName")).map_or(0.0, |tip| tip.capacity);
+        self.sizes.insert(id.to_owned(), size);
+        self.aimed.remove(id);
+        self.liquids.empty(id);
+        self.moved.remove(id);
     }
 
     fn drop(&mut self, command: &Command, bin: &str) -> Result<(), String> {
@@ -376,30 +377,17 @@ impl<'a> Steps<'a> {
         self.say(format!("drop tip{into} by {by}"))
     }
 
-    /// What is dispensed or blown out over a bin, to which the pipette was brought.
+    /// What is dispensed or blown out where the tip is: over a bin, to which the pipette was brought, or where it was moved to.
     fn give_in_place(&mut self, command: &Command) -> Result<(), String> {
-        let id = command.text("pipetteId");
-        let (_, by) = self.pipette(command)?;
-        let blows = command.command_type == "blowOutInPlace";
-        let Some((bin, _)) = self.aimed.get(id).and_then(|area| self.deck.bins.get(area)) else {
-            return match self.here(command) {
-                Some((there, _)) if blows => self.blow_out(&there),
-                Some((there, _)) => self.dispense(&there),
-                None => Err("it is done at the position of the tip, which is not known".to_owned()),
-            };
+        let over_bin = |area: &String| {
+            let mut there = command.clone();
+            there.params["labwareId"] = area.as_str().into();
+            there
         };
-        let flow = if blows { Flow::Blow } else { Flow::Out };
-        let options = self.options(command, Some(flow), &[]);
-        match blows {
-            true => {
-                self.liquids.blow_out(id, "", &[]);
-                self.say(format!("blow out into {bin}[A1] by {by}{options}"))
-            }
-            false => {
-                self.liquids.dispense(id, command.volume(), "", &[]);
-                self.say(format!("dispense {} uL into {bin}[A1] by {by}{options}", number(command.volume())))
-            }
-        }
+        let aimed = self.aimed.get(command.text("pipetteId")).map(over_bin);
+        let there = aimed.or_else(|| self.here(command).map(|(there, _)| there));
+        let there = there.ok_or("it is done at the position of the tip, which is not known")?;
+        if command.command_type == "blowOutInPlace" { self.blow_out(&there) } else { self.dispense(&there) }
     }
 
     /// A pipette has no tips any more.
