@@ -89,6 +89,11 @@ impl Form {
 pub(super) const TRASH_BIN: &str = "loadTrashBin";
 pub(super) const WASTE_CHUTE: &str = "loadWasteChute";
 
+/// Whether a message loads a bin or a chute.
+pub(super) fn loads_bin(name: &str) -> bool {
+    [TRASH_BIN, WASTE_CHUTE].contains(&name)
+}
+
 /// The message that says from which corner of a head tips are taken.
 pub(super) const LAY_OUT: &str = "layOut";
 

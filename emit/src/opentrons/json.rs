@@ -3,7 +3,7 @@
 use matterix_ir::Span;
 use serde_json::{Map, Value, json};
 
-use super::form::{TRASH_BIN, WASTE_CHUTE};
+use super::form::loads_bin;
 use super::protocol::{Command, Protocol};
 use crate::place;
 
@@ -12,8 +12,7 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Vec<u8> {
     let mut commands: Vec<Value> = Vec::new();
     let mut said: Option<Span> = None;
     // Bins are areas of the deck, which nothing loads.
-    let is_loaded = |command: &&Command| ![TRASH_BIN, WASTE_CHUTE].contains(&command.name);
-    for command in protocol.loads.iter().filter(is_loaded) {
+    for command in protocol.loads.iter().filter(|command| !loads_bin(command.name)) {
         commands.push(entry(commands.len(), command.name, &command.params));
     }
     for command in &protocol.commands {

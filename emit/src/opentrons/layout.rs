@@ -3,10 +3,9 @@
 use serde_json::{Value, json};
 
 /// A layout of nozzles, as the run engine has it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Layout {
     /// All of them.
-    #[default]
     All,
     /// One, in a corner.
     Single(String),

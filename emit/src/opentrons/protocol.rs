@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::WHAT;
 use super::deck::Deck;
-use super::form::{BIN_ID, TRASH_BIN, WASTE_CHUTE};
+use super::form::{BIN_ID, loads_bin};
 use super::writer::{MOVES, Writer};
 use crate::Subject;
 use crate::finding::not_expressible;
@@ -58,7 +58,7 @@ pub(super) struct Protocol<'p> {
 impl<'p> Protocol<'p> {
     /// Identifiers of the bins that are loaded.
     pub(super) fn bins(&self) -> BTreeSet<String> {
-        let loads = self.loads.iter().filter(|c| [TRASH_BIN, WASTE_CHUTE].contains(&c.name));
+        let loads = self.loads.iter().filter(|c| loads_bin(c.name));
         loads.map(|c| c.text(BIN_ID).to_owned()).collect()
     }
 
@@ -75,9 +75,7 @@ impl<'p> Protocol<'p> {
             moved: moved(subject, performance, &origins),
             later: BTreeMap::new(),
             off: BTreeSet::new(),
-            channels: BTreeMap::new(),
-            layouts: BTreeMap::new(),
-            corners: BTreeMap::new(),
+            heads: BTreeMap::new(),
             origins,
             protocol: Protocol {
                 subject,

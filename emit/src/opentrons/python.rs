@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, Span};
 use serde_json::Value;
 
 use super::WHAT;
-use super::deck::{BIN, CHUTE, GRIPPER_CHUTE};
+use super::deck::{BIN, CHUTE, GRIPPER_CHUTE, Waste};
 use super::form::{BIN_ID, TRASH_BIN, WASTE_CHUTE};
 use super::protocol::{Command, Protocol};
 use crate::finding::not_expressible;
@@ -22,7 +22,6 @@ pub(super) fn write(protocol: &Protocol<'_>) -> Result<Vec<u8>, Vec<Diagnostic>>
         binned: BTreeSet::new(),
         aimed: None,
         slots: BTreeMap::new(),
-        bins: protocol.bins(),
         areas: BTreeMap::new(),
     };
     script.head(protocol);
@@ -97,9 +96,7 @@ struct Script {
     binned: BTreeSet<String>,
     /// The pipette that was brought over an area to drop its tip, and what is called there.
     aimed: Option<(String, String)>,
-    /// Bins and chutes that are loaded.
-    bins: BTreeSet<String>,
-    /// The same by their areas; the chute by what its areas end in.
+    /// Bins and chutes that are loaded, by their areas; the chute by what its areas end in.
     areas: BTreeMap<String, String>,
     /// In which slot labware stands.
     slots: BTreeMap<String, String>,
@@ -221,7 +218,7 @@ impl Script {
             }
             TRASH_BIN => {
                 let Some(slot) = location["slotName"].as_str() else { return false };
-                self.areas.insert(format!("movableTrash{slot}"), text(BIN_ID).to_owned());
+                self.areas.insert(Waste::Bin(slot.to_owned()).area(""), text(BIN_ID).to_owned());
                 self.line(&format!("{} = protocol.load_trash_bin({})", text(BIN_ID), quoted(slot)));
             }
             WASTE_CHUTE => {
@@ -240,14 +237,12 @@ impl Script {
         let number = |name: &str| shown(command.params.get(name));
         let (pipette, module) = (text("pipetteId"), text("moduleId"));
         let well = format!("{}[{}]", text("labwareId"), quoted(text("wellName")));
-        let spot = match self.bins.contains(text("labwareId")) {
-            true => text("labwareId").to_owned(),
-            false => spot(command, &well),
-        };
+        let over_bin = self.areas.values().any(|bin| bin == text("labwareId"));
+        let spot = if over_bin { text("labwareId").to_owned() } else { spot(command, &well) };
         let offset = |axis: &str| shown(command.params.get("wellLocation").map(|location| &location["offset"][axis]));
         let aimed = self.aimed.take();
         match (text("labwareId"), command.params.contains_key("coordinates")) {
-            (id, _) if id == BIN || self.bins.contains(id) => drop(self.binned.insert(pipette.to_owned())),
+            (id, _) if id == BIN || over_bin => drop(self.binned.insert(pipette.to_owned())),
             ("", false) => {}
             _ => drop(self.binned.remove(pipette)),
         }

@@ -9,7 +9,7 @@ use matterix_ir::{Diagnostic, Span};
 use serde_json::{Map, Value, json};
 
 use super::WHAT;
-use super::deck::{Deck, GRIPPER_CHUTE, Location, Waste};
+use super::deck::{Deck, GRIPPER_CHUTE, Location, Waste, label};
 use super::form::{About, BIN_ID, BY_GRIPPER, Holds, LAY_OUT, TRASH_BIN};
 use super::layout::Layout;
 use super::message::{Message, names};
@@ -23,6 +23,16 @@ const OWN: &str = "opentrons";
 /// How the command begins that moves labware.
 pub(super) const MOVES: &str = "moveLabware ";
 
+/// A pipette, and how it takes tips.
+#[derive(Debug)]
+pub(super) struct Head {
+    channels: usize,
+    /// The corner of it at which the channels begin that take tips next, or `all`.
+    corner: String,
+    /// Which nozzles take tips.
+    layout: Layout,
+}
+
 /// A protocol that is being put together.
 pub(super) struct Writer<'p, 'f> {
     pub(super) protocol: Protocol<'p>,
@@ -32,12 +42,8 @@ pub(super) struct Writer<'p, 'f> {
     pub(super) moved: BTreeMap<InstanceId, bool>,
     /// Labware that stands off the deck now.
     pub(super) off: BTreeSet<InstanceId>,
-    /// How many channels pipettes have.
-    pub(super) channels: BTreeMap<InstanceId, usize>,
-    /// Which nozzles of pipettes take tips.
-    pub(super) layouts: BTreeMap<InstanceId, Layout>,
-    /// From which corner of a head tips are taken next.
-    pub(super) corners: BTreeMap<InstanceId, String>,
+    /// Pipettes that are loaded.
+    pub(super) heads: BTreeMap<InstanceId, Head>,
     /// What loads labware that comes to the deck on the way, without a question.
     pub(super) later: BTreeMap<InstanceId, Said>,
     pub(super) found: &'f mut Vec<Diagnostic>,
@@ -120,7 +126,7 @@ impl Writer<'_, '_> {
             return self.found.push(d);
         }
         if message.form.about == About::Bin {
-            let slot = super::deck::label(message.get("location").unwrap_or_default()).to_owned();
+            let slot = label(message.get("location").unwrap_or_default()).to_owned();
             let waste = if message.form.name == TRASH_BIN { Waste::Bin(slot) } else { Waste::Chute };
             self.deck.keep_waste(wired.device, waste);
         }
@@ -181,7 +187,9 @@ impl Writer<'_, '_> {
                 }
             };
             if message.form.name == LAY_OUT {
-                self.corners.insert(device, message.get("corner").unwrap_or("all").to_owned());
+                if let Some(head) = self.heads.get_mut(&device) {
+                    head.corner = message.get("corner").unwrap_or("all").to_owned();
+                }
                 continue;
             }
             match self.lay_out(device, &message, at).and_then(|()| self.command(device, &message, at)) {
@@ -197,7 +205,7 @@ impl Writer<'_, '_> {
             ["pipetteName", "channels", "rows"].map(|field| message.get(field).unwrap_or_default());
         let parsed = |text: &str| text.parse::<usize>().unwrap_or(0);
         let (channels, rows) = (parsed(channels), parsed(rows));
-        self.channels.insert(device, channels);
+        self.heads.insert(device, Head { channels, corner: "all".to_owned(), layout: Layout::All });
         let expected = match model {
             m if m.ends_with("_96") => 96,
             m if m.contains("_multi") => 8,
@@ -219,26 +227,22 @@ impl Writer<'_, '_> {
 
     /// Says which nozzles take tips, where that is not as it was.
     fn lay_out(&mut self, device: InstanceId, message: &Message<'_>, at: Span) -> Result<(), Diagnostic> {
-        if message.form.name != "pickUpTip" {
+        let Some(head) = self.heads.get_mut(&device).filter(|_| message.form.name == "pickUpTip") else {
             return Ok(());
-        }
+        };
         let places = names(message.get("well").unwrap_or_default());
-        let labels: Vec<&str> = places.iter().map(|place| super::deck::label(place)).collect();
-        let Some(layout) = Layout::of(
-            self.corners.get(&device).map_or("all", String::as_str),
-            &labels,
-            self.channels.get(&device).copied().unwrap_or(1),
-        ) else {
+        let labels: Vec<&str> = places.iter().map(|place| label(place)).collect();
+        let Some(layout) = Layout::of(&head.corner, &labels, head.channels) else {
             let headline = format!("{WHAT} has no layout of nozzles for these {} tips", labels.len());
             let help = "take one tip, a column from `A1` or `A12`, a row from `A1` or `H1`, or fewer than eight of a column from `H1`";
             return Err(not_expressible(at, headline, "this step takes them").help(help));
         };
-        if self.layouts.get(&device).unwrap_or(&Layout::All) != &layout {
+        if head.layout != layout {
             let own = self.deck.get(device).map(|l| l.id.clone()).unwrap_or_default();
             let params = json!({ "pipetteId": own, "configurationParams": layout.params() });
+            head.layout = layout;
             self.push("configureNozzleLayout", params, at);
         }
-        self.layouts.insert(device, layout);
         Ok(())
     }
 
@@ -332,10 +336,7 @@ impl Writer<'_, '_> {
                     let scene = &self.protocol.subject.program.scene;
                     let labware = scene.find(value).and_then(|id| self.deck.get(id));
                     let Some(labware) = labware.filter(|l| l.about == About::Labware) else {
-                        let headline =
-                            format!("`{value}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
-                        let help = "place it on the deck, or on a module there, before this step";
-                        return Err(not_expressible(at, headline, "this step moves it").help(help));
+                        return Err(self.not_on_deck(value, at, "this step moves it"));
                     };
                     params.insert("labwareId".to_owned(), labware.id.clone().into());
                 }
@@ -389,19 +390,23 @@ impl Writer<'_, '_> {
             let is_off = |id: &InstanceId| scene.get(*id).owner.is_some_and(|owner| self.off.contains(&owner));
             let place = scene.find(name).filter(|id| !is_off(id)).and_then(|id| self.deck.well(id));
             let Some(place) = place else {
-                let headline = format!("`{name}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
-                let help = "place it on the deck, or on a module there, before this step";
-                return Err(not_expressible(at, headline, "this step goes there").help(help));
+                return Err(self.not_on_deck(name, at, "this step goes there"));
             };
             places.push(place);
         }
-        let names_front = self.layouts.get(&device).is_some_and(Layout::names_front);
+        let names_front = self.heads.get(&device).is_some_and(|head| head.layout.names_front());
         let first = if names_front { places.last() } else { places.first() };
         let Some(first) = first.cloned() else { return Err(message.wrong("it names no place".to_owned())) };
         if places.iter().any(|(labware, _)| *labware != first.0) {
             return Err(not_expressible(at, format!("{WHAT} goes to one labware at a time"), "several labware"));
         }
         Ok(first)
+    }
+
+    /// A finding about what is not on the deck where a step needs it there.
+    fn not_on_deck(&self, name: &str, at: Span, label: &str) -> Diagnostic {
+        let headline = format!("`{name}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
+        not_expressible(at, headline, label).help("place it on the deck, or on a module there, before this step")
     }
 
     /// Puts in the definition of a labware, and keeps it where Opentrons does not know it.
