@@ -3,32 +3,18 @@
 use serde_json::{Value, json};
 
 use crate::harness::{flat, folder, matterixc_in, write};
+use crate::protocols::{self, command, there_and_back};
 
-/// Labware with `rows` and `columns` of round wells 9 mm apart, as the run engine loads it.
+/// What protocols are written as here.
+const PYTHON: &str = "opentrons-python";
+
+/// Labware with so many rows and columns of wells, so deep, mm, of so many uL, somewhere on the deck.
 fn load(id: &str, name: &str, location: Value, (rows, columns): (usize, usize), [depth, volume]: [f64; 2]) -> Value {
-    let cell = |row: usize, column: usize| format!("{}{}", char::from(b'A' + row as u8), column + 1);
     let category = if name.contains("tiprack_") && !name.ends_with("adapter") { "tipRack" } else { "wellPlate" };
-    let well = |row: usize, column: usize| {
-        json!({ "depth": depth, "diameter": 6.0, "totalLiquidVolume": volume, "shape": "circular",
-            "x": 14.38 + 9.0 * column as f64, "y": 74.24 - 9.0 * row as f64, "z": 1.0 })
-    };
-    let wells: serde_json::Map<String, Value> =
-        (0..columns).flat_map(|c| (0..rows).map(move |r| (cell(r, c), well(r, c)))).collect();
-    let ordering: Vec<Vec<String>> = (0..columns).map(|c| (0..rows).map(|r| cell(r, c)).collect()).collect();
-    let definition = json!({
-        "schemaVersion": 2, "namespace": "opentrons", "version": 1, "metadata": { "displayCategory": category }, "wells": wells,
-        "ordering": ordering, "parameters": { "isTiprack": category == "tipRack", "tipLength": depth, "loadName": name },
-        "dimensions": { "xDimension": 127.76, "yDimension": 85.48, "zDimension": 1.0 + depth },
-    });
-    json!({
-        "commandType": "loadLabware",
-        "params": { "location": location, "loadName": name, "namespace": "opentrons", "version": 1, "displayName": id },
-        "result": { "labwareId": id, "definition": definition },
-    })
-}
-
-fn command(name: &str, params: Value) -> Value {
-    json!({ "commandType": name, "params": params })
+    let definition = protocols::definition(category, rows, columns, [depth, 6.0, volume]);
+    let mut loaded = protocols::load(id, (name, 1), "", definition);
+    loaded["params"]["location"] = location;
+    loaded
 }
 
 fn module(id: &str, model: &str, slot: &str) -> Value {
@@ -44,25 +30,10 @@ fn well(name: &str, labware: &str, place: &str, more: Value) -> Value {
 }
 
 /// An analysis of a protocol for the Flex with one pipette.
-fn analysis(pipette: &str, steps: Vec<Value>) -> String {
+fn analysis(pipette: &str, steps: Vec<Value>) -> Value {
     let first = json!({ "commandType": "loadPipette", "params": { "pipetteName": pipette, "mount": "left" }, "result": { "pipetteId": "p" } });
     let commands: Vec<Value> = std::iter::once(first).chain(steps).collect();
     json!({ "robotType": "OT-3 Standard", "metadata": { "protocolName": "Flex" }, "errors": [], "commands": commands })
-        .to_string()
-}
-
-/// What is imported, checked without a finding, and its Python.
-fn there_and_back(name: &str, analysis: String) -> (String, String) {
-    let dir = folder(name);
-    write(&dir, "a.json", analysis);
-    let imported = matterixc_in(&dir, &["import", "opentrons", "a.json", "--out", "a.mtx"]);
-    assert_eq!((imported.code, imported.err.as_str()), (0, ""), "{}", imported.out);
-    let text = std::fs::read_to_string(dir.join("a.mtx")).expect("it is written");
-    let checked = matterixc_in(&dir, &["check", "--strict", "a.mtx"]);
-    assert_eq!(checked.code, 0, "{}\n{text}", checked.out);
-    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
-    assert_eq!(emitted.code, 0, "{}\n{text}", emitted.err);
-    (text, emitted.out)
 }
 
 /// A file that is checked: its exit status and what it prints.
@@ -108,7 +79,7 @@ fn a_protocol_with_gripper_bins_and_modules_comes_back() {
         command("heaterShaker/openLabwareLatch", json!({ "moduleId": "shaker" })),
         to(json!({ "addressableAreaName": "gripperWasteChute" })),
     ];
-    let (text, python) = there_and_back("flex_back", analysis("p1000_multi_flex", steps));
+    let (text, python) = there_and_back("flex_back", &analysis("p1000_multi_flex", steps), PYTHON);
     for line in [
         "flex = Flex { left: FlexP1000Multi, gripper: FlexGripper, trash: chute } at (0, 0, 0) m",
         "chute = WasteChute on flex.slot[D3]",
@@ -160,7 +131,7 @@ fn ninety_six_channels_take_a_rack_and_fill_a_plate() {
         ),
         command("dropTipInPlace", json!({ "pipetteId": "p" })),
     ];
-    let (text, python) = there_and_back("flex_96", analysis("p1000_96", steps));
+    let (text, python) = there_and_back("flex_96", &analysis("p1000_96", steps), PYTHON);
     for line in [
         "tips = FlexTips200 on holder",
         "pick up tip from tips by flex.left",
@@ -217,7 +188,7 @@ fn layouts_of_some_nozzles_come_back() {
         .push(command("configureNozzleLayout", json!({ "pipetteId": "p", "configurationParams": { "style": "ALL" } })));
     steps.push(well("pickUpTip", "tips", "A2", json!({})));
     away(&mut steps);
-    let (text, python) = there_and_back("flex_layouts", analysis("p1000_multi_flex", steps));
+    let (text, python) = there_and_back("flex_layouts", &analysis("p1000_multi_flex", steps), PYTHON);
     for line in [
         "lay out flex.left from H1\n    pick up tip tips[A1] by flex.left\n    aspirate 20 uL from plate[C4] by flex.left",
         "pick up tip [tips[B1], tips[C1], tips[D1]] by flex.left\n    aspirate 20 uL from [plate[A5], plate[B5], plate[C5]] by flex.left",
@@ -247,7 +218,7 @@ fn a_layout_that_the_language_does_not_have_is_listed_and_what_follows_is_left_o
         command("configureNozzleLayout", json!({ "pipetteId": "p", "configurationParams": quadrant })),
         well("pickUpTip", "tips", "A1", json!({})),
     ];
-    write(&dir, "a.json", analysis("p1000_96", steps));
+    write(&dir, "a.json", analysis("p1000_96", steps).to_string());
     let imported = matterixc_in(&dir, &["import", "opentrons", "a.json", "--out", "a.mtx"]);
     let said = flat(&imported.err);
     assert!(said.contains("configureNozzleLayout (command 3)") && said.contains("pickUpTip (command 4)"), "{said}");
@@ -483,7 +454,7 @@ fn strokes_at_the_place_of_the_tip_keep_what_their_class_corrects() {
         ),
         command("thermocycler/deactivateBlock", json!({ "moduleId": "cycler" })),
     ];
-    let (text, _) = there_and_back("flex_corrected", analysis("p1000_single_flex", steps));
+    let (text, _) = there_and_back("flex_corrected", &analysis("p1000_single_flex", steps), PYTHON);
     for line in [
         "aspirate 98.25 uL from plate[A1] by flex.left at bottom + 2 mm { fix: -1.75 uL, rate: 100 uL/s }",
         "air gap 10 uL by flex.left { rate: 12 uL/s }",

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::harness::{flat, folder, matterixc_in, write};
 
 /// A definition: rows and columns of round wells 9 mm apart, so deep and wide, mm, of so many uL.
-fn definition(category: &str, rows: usize, columns: usize, [depth, diameter, volume]: [f64; 3]) -> Value {
+pub fn definition(category: &str, rows: usize, columns: usize, [depth, diameter, volume]: [f64; 3]) -> Value {
     let name = |row: usize, column: usize| format!("{}{}", char::from(b'A' + row as u8), column + 1);
     let mut wells = Map::new();
     for row in 0..rows {
@@ -25,7 +25,7 @@ fn definition(category: &str, rows: usize, columns: usize, [depth, diameter, vol
     })
 }
 
-fn load(id: &str, (load_name, version): (&str, u32), slot: &str, mut definition: Value) -> Value {
+pub fn load(id: &str, (load_name, version): (&str, u32), slot: &str, mut definition: Value) -> Value {
     definition["version"] = version.into();
     definition["parameters"]["loadName"] = load_name.into();
     json!({
@@ -35,7 +35,7 @@ fn load(id: &str, (load_name, version): (&str, u32), slot: &str, mut definition:
     })
 }
 
-fn command(name: &str, params: Value) -> Value {
+pub fn command(name: &str, params: Value) -> Value {
     json!({ "commandType": name, "params": params })
 }
 
@@ -166,16 +166,22 @@ fn more_than_a_well_holds_is_air_for_the_rest() {
 
 /// The text that these steps are imported as, which must be without a finding, and what `emit` makes of it.
 fn imported(name: &str, steps: Vec<Value>) -> (String, Value) {
+    let (text, emitted) = there_and_back(name, &analysis(steps), "opentrons-json");
+    (text, serde_json::from_str(&emitted).expect("it is JSON"))
+}
+
+/// The text that an analysis is imported as, which must be without a finding, and what `emit` makes of it for a target.
+pub fn there_and_back(name: &str, analysis: &Value, target: &str) -> (String, String) {
     let dir = folder(name);
-    write(&dir, "a.json", analysis(steps).to_string());
+    write(&dir, "a.json", analysis.to_string());
     let imported = matterixc_in(&dir, &["import", "opentrons", "a.json", "--out", "a.mtx"]);
     assert_eq!((imported.code, imported.err.as_str()), (0, ""), "{}", imported.out);
     let text = std::fs::read_to_string(dir.join("a.mtx")).expect("it is written");
     let checked = matterixc_in(&dir, &["check", "--strict", "a.mtx"]);
     assert_eq!(checked.code, 0, "{}\n{text}", checked.out);
-    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-json"]);
+    let emitted = matterixc_in(&dir, &["emit", "a.mtx", "--target", target]);
     assert_eq!(emitted.code, 0, "{}\n{text}", emitted.err);
-    (text, serde_json::from_str(&emitted.out).expect("it is JSON"))
+    (text, emitted.out)
 }
 
 /// Commands of a protocol by name, with the wells that they are about.
